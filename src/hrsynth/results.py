@@ -11,6 +11,7 @@ from math import isfinite
 from typing import Any, ClassVar, ParamSpec, TypeVar
 
 from .errors import shorten_text
+from .records import Record
 
 LONGEST_LINE, LONGEST_PART = 160, 48
 """Characters of a value at a prompt, and of each of its fields there."""
@@ -26,7 +27,7 @@ def finite(value: float | None) -> float | None:
     return None if value is None or not isfinite(value) else float(value)
 
 
-class Value:
+class Value(Record):
     """A frozen dataclass (with ``repr=False``) that is one line at a prompt, and is pickled and copied by its fields:
     what was computed from them is computed again where it is asked for, and arrays stay read-only."""
 
@@ -116,10 +117,6 @@ class Result(Compared):
     def said(self) -> tuple[Any, ...]:
         """What is compared: the robot with what is watched of it, and the record."""
         return getattr(self, "setting", None), self.to_dict()
-
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        raise NotImplementedError
 
     def __hash__(self) -> int:
         return hash(self.headline() if self.word is None else self.word)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -13,10 +13,21 @@ from ..errors import PlaneNotMet, PoseNotReached
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism.pose import Grid, PoseLike, asked_poses
 from ..progress import tell
+from ..records import FLAT, As, Shown, Table, recorded
 from ..results import Result, Value
 from .asked import asked_at, require_platform
 from .classes import Redundancy, list_redundant
-from .observed import CameraLike, LegsLike, Mobility, ObservedRobot, RobotLike, SeeLike
+from .observed import (
+    UNLIMITED,
+    CameraLike,
+    LegsLike,
+    Mobility,
+    MobilityWritten,
+    ObservedRobot,
+    RobotLike,
+    SeeLike,
+    WatchedAxis,
+)
 from .posture import ConfigurationAnalysis, Posture
 from .question import question
 
@@ -28,9 +39,9 @@ MEASURES = ("type2", "type1", "constraints", "condition", "mm_per_degree", "degr
 class GridCheck(Value):
     """The postures over a grid of poses, in its order; None where a pose is not reached."""
 
-    grid: Grid
+    grid: Annotated[Grid, FLAT]
     postures: tuple[Posture | None, ...]
-    free: tuple[str, ...]
+    free: Annotated[tuple[str, ...], ""]
     """The parts of the pose that are neither varied nor held."""
     dependent: str | None = None
     """That parts of its poses depend on each other, where some are not reached."""
@@ -44,16 +55,25 @@ class GridCheck(Value):
         """One of ``MEASURES`` at each cell; None where the pose is not reached or the value is infinite."""
         return tuple(None if each is None else each.distances.to_dict()[measure] for each in self.postures)
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line: arrays nested in the order of ``axes``."""
-        shape = self.grid.shape
-        nested = {name: np.array(self.values(name), dtype=object).reshape(shape).tolist() for name in MEASURES}
-        return {
-            **self.grid.to_dict(),
-            "free": list(self.free),
-            "state": np.array(self.states, dtype=object).reshape(shape).tolist(),
-            **nested,
-        }
+    def nested(self, values: Sequence[Any]) -> Table:
+        """A value of each cell, nested in the order of ``axes``."""
+        told: Table = np.array(values, dtype=object).reshape(self.grid.shape).tolist()
+        return told
+
+    state = Shown(Table, lambda self: self.nested(self.states))
+    type2 = Shown(Table, lambda self: self.nested(self.values("type2")))
+    type1 = Shown(Table, lambda self: self.nested(self.values("type1")))
+    constraints = Shown(Table, lambda self: self.nested(self.values("constraints")))
+    condition = Shown(Table, lambda self: self.nested(self.values("condition")))
+    mm_per_degree = Shown(Table, lambda self: self.nested(self.values("mm_per_degree")))
+    degrees_per_degree = Shown(Table, lambda self: self.nested(self.values("degrees_per_degree")))
+
+
+class Unreached(NamedTuple):
+    """A requested pose, as it was written, and why it is not reached."""
+
+    pose: str
+    reason: str
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -61,14 +81,15 @@ class Check(Result, shown_as="check"):
     """What is observed, the postures at the requested poses, and the loop constraints that are redundant at
     generic ones."""
 
-    setting: ObservedRobot
-    postures: tuple[Posture, ...]
-    redundant: tuple[Redundancy, ...]
-    grid: GridCheck | None = None
+    setting: Annotated[ObservedRobot, FLAT]
+    postures: Annotated[tuple[Posture, ...], As("configurations")]
+    redundant: Annotated[tuple[Redundancy, ...], ""]
+    grid: Annotated[GridCheck | None, ""] = None
     unreached: tuple[PoseNotReached, ...] = ()
     """The poses asked for that the robot does not reach, and why."""
 
     @property
+    @recorded(As("characteristic_length"))
     def length(self) -> float:
         """The characteristic length (m) that makes lengths comparable with angles."""
         return self.setting.everything.twin.length
@@ -87,19 +108,12 @@ class Check(Result, shown_as="check"):
         states += [f"{each.pose} not reached" for each in self.unreached]
         return f"{self.setting.headline()}: {'; '.join(states)}"
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line, without the command's own fields."""
-        return {
-            "characteristic_length": self.length,
-            **self.setting.to_dict(),
-            "watched": self.setting.watched_dict(),
-            "mobility": self.setting.mobility_dict(),
-            "configurations": [each.to_dict() for each in self.postures],
-            "unreached": [{"pose": each.pose, "reason": each.reason} for each in self.unreached],
-            "redundant": [each.to_dict() for each in self.redundant],
-            "grid": self.grid and self.grid.to_dict(),
-            "unlimited": list(self.setting.unlimited),
-        }
+    told_unreached = Shown(
+        list[Unreached], lambda self: [Unreached(each.pose, each.reason) for each in self.unreached], As("unreached")
+    )
+    watched = Shown(list[WatchedAxis], lambda self: self.setting.told_watched)
+    mobility = Shown(MobilityWritten, lambda self: self.setting.mobilities)
+    unlimited = Shown(list[str], lambda self: self.setting.unlimited, UNLIMITED)
 
 
 @question(formations=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -13,6 +13,7 @@ from ..geometry.ranks import Rank, range_basis, rank_of
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.relation import Relation
+from ..records import Record
 from ..tolerances import RANK_GAP
 
 
@@ -46,7 +47,7 @@ def gap_of(found: Relation) -> float:
 
 
 @dataclass(frozen=True)
-class Classes:
+class Classes(Record, all_told=True):
     """Zlatanov's six: RI, RO, RPM, IIM as excess, II, IO as deficit over the generic values.
 
     RO = dim {t : (t, 0) ∈ ρ}, RI = dim {u̇ : (0, u̇) ∈ ρ}, RPM = dim {q̇ : t = 0, u̇ = 0}, IIM = mobility,
@@ -88,10 +89,6 @@ class Classes:
         """Both."""
         return self.type1 and self.type2
 
-    def to_dict(self) -> dict[str, int]:
-        """The record of the command line."""
-        return asdict(self)
-
 
 def interaction_matrix(found: Relation) -> Array | None:
     """Mᵀ (rates, dof) on the basis ``found.twists`` of the feasible twists (MMT eq. 7; lengths in characteristic
@@ -102,17 +99,13 @@ def interaction_matrix(found: Relation) -> Array | None:
 
 
 @dataclass(frozen=True)
-class Redundancy:
+class Redundancy(Record, all_told=True):
     """``rows`` constraints of the loop that the file calls ``loop`` repeat what earlier loops say already; at
     generic configurations where ``generic``."""
 
     loop: str
     rows: int
     generic: bool
-
-    def to_dict(self) -> dict[str, object]:
-        """The record of the command line."""
-        return {"loop": self.loop, "rows": self.rows, "generic": self.generic}
 
 
 Rows = tuple[tuple[str, int], ...]

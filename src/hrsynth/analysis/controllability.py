@@ -6,16 +6,27 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import combinations
 from math import comb
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from ..kinematics.sampling import Samples
 from ..mechanism.observation import labels_of
 from ..mechanism.pose import PoseLike, asked_pose
 from ..progress import tell
+from ..records import FLAT, As, Shown, recorded
 from ..results import Result
 from .asked import observe as observed
 from .exact import ExactVerdict, architecture
-from .observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike, restrict_samples
+from .observed import (
+    CameraLike,
+    LegsLike,
+    ObservedRobot,
+    OperationModeRecord,
+    OtherMode,
+    RobotLike,
+    SeeLike,
+    WatchedAxis,
+    restrict_samples,
+)
 from .question import question
 from .verdict import Verdict, verdict_of
 
@@ -30,22 +41,30 @@ MOST_TRIED = 1024
 """Sets of one size above which the smallest are not sought but one set of which none can be left out."""
 
 
+class LegSet(NamedTuple):
+    """A set of watched legs."""
+
+    verdict: Annotated[Verdict, FLAT]
+    exact: bool
+    architecture: ExactVerdict
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Legs(Result, shown_as="legs"):
     """The verdict of every set of observed legs, and the smallest sets of the best rank."""
 
     setting: ObservedRobot
-    robot: str
-    architecture: str
-    dof: int
+    robot: Annotated[str, ""]
+    architecture: Annotated[str, As("architecture_ascii")]
+    dof: Annotated[int, ""]
     sets: tuple[Verdict, ...]
     exact: tuple[ExactVerdict, ...]
     """What generic geometry of the same architecture sees, for each of ``sets``."""
-    complete: bool
+    complete: Annotated[bool, ""]
     """Whether all sets are listed."""
-    minimal: tuple[tuple[str, ...], ...] = field(default=())
+    minimal: Annotated[tuple[tuple[str, ...], ...], ""] = field(default=())
     """The smallest sets of the best rank; none where that is 0, as in the catalog."""
-    minimal_complete: bool = True
+    minimal_complete: Annotated[bool, ""] = True
     """Whether ``minimal`` has all smallest sets; else it has one of which none can be left out."""
     where: str = "the zero configuration"
     """What took the place of the zero configuration, as it was asked for."""
@@ -59,22 +78,15 @@ class Legs(Result, shown_as="legs"):
         """The smallest sets as text."""
         return "  ".join("{" + ", ".join(each) + "}" for each in self.minimal) or "none, the best rank is 0"
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {
-            "robot": self.robot,
-            "architecture_ascii": self.architecture,
-            "dof": self.dof,
-            "sets": [
-                {**each.to_dict(), "exact": exact.exact, "architecture": exact.to_dict()}
-                for each, exact in zip(self.sets, self.exact, strict=True)
-            ],
-            "complete": self.complete,
-            "watched": self.setting.watched_dict(),
-            "minimal": [list(each) for each in self.minimal],
-            "minimal_complete": self.minimal_complete,
-            **self.setting.modes_dict(),
-        }
+    @property
+    @recorded(As("sets"))
+    def told_sets(self) -> list[LegSet]:
+        """The sets, each with what generic geometry of the same architecture sees."""
+        return [LegSet(each, exact.exact, exact) for each, exact in zip(self.sets, self.exact, strict=True)]
+
+    watched = Shown(list[WatchedAxis], lambda self: self.setting.told_watched)
+    operation_mode = Shown(OperationModeRecord, lambda self: self.setting.operation_mode)
+    other_modes = Shown(list[OtherMode], lambda self: self.setting.other_modes)
 
 
 def _smallest(labels: tuple[str, ...], rank: Callable[[tuple[str, ...]], int]) -> tuple[list[tuple[str, ...]], bool]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from ..description.tree import spanning
 from ..errors import BadMechanism, BadRequest, NotCertified
 from ..geometry.ranks import range_basis
 from ..geometry.vectors import Array
-from ..kinematics.certificate import Certificate, certify
+from ..kinematics.certificate import ANGLE, Certificate, certify
 from ..kinematics.sampling import Samples
 from ..mechanism import Mechanism
 from ..mechanism.legs import LegDecomposition, decompose
@@ -20,6 +20,7 @@ from ..mechanism.normal import normal_form
 from ..mechanism.notation import Architecture
 from ..mechanism.observations.direction import Direction
 from ..progress import tell
+from ..records import FLAT, As, Shown, recorded
 from ..results import Result, Value
 from ..rewrite.evidence import Evidence
 from ..rewrite.state import State
@@ -29,7 +30,17 @@ from .asked import observe as observed_robot
 from .exact import ExactVerdict
 from .exact import architecture as exact_architecture
 from .freedoms import Freedom, name_freedoms
-from .observed import CameraLike, LegsLike, Mobility, ObservedRobot, RobotLike, SeeLike
+from .observed import (
+    CameraLike,
+    LegsLike,
+    Mobility,
+    MobilityWritten,
+    ObservedRobot,
+    OperationModeRecord,
+    OtherMode,
+    RobotLike,
+    SeeLike,
+)
 from .question import question
 from .verdict import Verdict, verdict_of
 
@@ -46,22 +57,23 @@ class UncheckedForm(Value):
     """The architecture of unchecked rules, whether it is equivalent, and the freedoms that it gains or loses."""
 
     hidden: Architecture
-    equivalent: bool
-    largest_angle: float
-    gains: tuple[Freedom, ...] = ()
-    loses: tuple[Freedom, ...] = ()
-    reason: str = ""
+    equivalent: Annotated[bool, ""]
+    largest_angle: Annotated[float, ANGLE]
+    gains: Annotated[tuple[Freedom, ...], ""] = ()
+    loses: Annotated[tuple[Freedom, ...], ""] = ()
+    reason: Annotated[str, ""] = ""
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {
-            "hidden_ascii": self.hidden.ascii,
-            "equivalent": self.equivalent,
-            "largest_angle": self.largest_angle,
-            "gains": [f.to_dict() for f in self.gains],
-            "loses": [f.to_dict() for f in self.loses],
-            "reason": self.reason,
-        }
+    hidden_ascii = Shown(str, lambda self: self.hidden.ascii)
+
+
+class Notation(NamedTuple):
+    """The architectures; those of the hidden robot are null if every leg is blind."""
+
+    real: str
+    hidden: str | None
+    real_ascii: str
+    hidden_ascii: str | None
+    hidden_latex: str | None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -69,32 +81,35 @@ class Derivation(Result, shown_as="derive"):
     """A robot, what is observed, its hidden robot (None if every leg is blind), how it was derived, and the proof."""
 
     robot: Mechanism
-    setting: ObservedRobot
-    form: str
+    setting: Annotated[ObservedRobot, FLAT]
+    form: Annotated[str, Literal["simplified", "general"]]
     architecture: Architecture
     hidden: Mechanism | None
     hidden_architecture: Architecture | None
     verdict: Verdict
-    exact: ExactVerdict
+    exact: Annotated[ExactVerdict, As("architecture")]
     """What generic geometry of the same architecture sees."""
     taken: tuple[Step, ...]
     """All attempts; those of the observed legs were compared with the real robot all together."""
-    certificate: Certificate
-    unchecked: UncheckedForm | None
+    certificate: Annotated[Certificate, ""]
+    unchecked: Annotated[UncheckedForm | None, As("unchecked_form")]
 
     @cached_property
+    @recorded()
     def steps(self) -> tuple[Step, ...]:
         """All attempts, each compared separately with the real robot."""
         check = _check(self.setting.samples, STEP_SAMPLES)
         return tuple(step.measured(check) for step in self.taken)
 
     @property
+    @recorded()
     def equal_where(self) -> tuple[str, ...]:
         """Conditions under which ρ is the real robot's at a closed configuration of the branch, be it singular
         (theory.md, section 4); elsewhere the hidden robot may have more or fewer singularities."""
         return tuple(dict.fromkeys(each for step in self.taken if step.accepted for each in step.keeps))
 
     @property
+    @recorded()
     def dof(self) -> int:
         """The robot's dof."""
         return self.setting.dof
@@ -119,46 +134,20 @@ class Derivation(Result, shown_as="derive"):
 
         return modes(self.setting, at=at, real=real)
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line, without the command's own fields."""
-        hidden = self.hidden_architecture
-        return {
-            **self.setting.to_dict(),
-            "notation": {
-                "real": self.architecture.unicode,
-                "hidden": hidden and hidden.unicode,
-                "real_ascii": self.architecture.ascii,
-                "hidden_ascii": hidden and hidden.ascii,
-                "hidden_latex": hidden and hidden.latex,
-            },
-            "form": self.form,
-            "dof": self.dof,
-            "mobility": self.setting.mobility_dict(),
-            "verdict": self.verdict.verdict,
-            "lost": [freedom.to_dict() for freedom in self.verdict.lost],
-            "rank": self.verdict.rank,
-            "margin": self.verdict.margin,
-            **({} if self.verdict.rank_at_zero is None else {"rank_at_zero": self.verdict.rank_at_zero}),
-            **({} if self.verdict.formation is None else {"formation": self.verdict.formation.to_dict()}),
-            "point_platform": self.setting.anatomy.point is not None,
-            "has_interaction_matrix": self.verdict.has_interaction_matrix,
-            "interaction_matrix": self.verdict.has_interaction_matrix,
-            "architecture": self.exact.to_dict(),
-            "unchecked_form": self.unchecked and self.unchecked.to_dict(),
-            "steps": [
-                {
-                    "rule": s.rule,
-                    "leg": s.leg,
-                    "accepted": s.accepted,
-                    "reason": s.reason,
-                    "largest_angle": s.largest_angle,
-                }
-                for s in self.steps
-            ],
-            "certificate": self.certificate.to_dict(),
-            "equal_where": list(self.equal_where),
-            **self.setting.modes_dict(),
-        }
+    @property
+    @recorded()
+    def notation(self) -> Notation:
+        """The architectures; those of the hidden robot are null if every leg is blind."""
+        real, hidden = self.architecture, self.hidden_architecture
+        if hidden is None:
+            return Notation(real.unicode, None, real.ascii, None, None)
+        return Notation(real.unicode, hidden.unicode, real.ascii, hidden.ascii, hidden.latex)
+
+    told_verdict = Shown(Verdict, lambda self: self.verdict, As(flat=True, without=("legs", "gap")))
+    told_mobility = Shown(MobilityWritten, lambda self: self.setting.mobilities, As("mobility"))
+    point_platform = Shown(bool, lambda self: self.setting.anatomy.point is not None)
+    operation_mode = Shown(OperationModeRecord, lambda self: self.setting.operation_mode)
+    other_modes = Shown(list[OtherMode], lambda self: self.setting.other_modes)
 
 
 @question(formations=True)

@@ -23,7 +23,7 @@ import random
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
@@ -37,6 +37,7 @@ from ..mechanism.model import JointType
 from ..mechanism.observation import labels_of
 from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.relations import Relations, recognise
+from ..records import OPTIONAL, As, Record
 from ..results import Compared, finite
 from ..tolerances import CLOSED
 from .formation import PLACES, following, sense_links
@@ -45,7 +46,7 @@ from .instances import Instance, NotRecognised, draw, instance, kernel, random_n
 from .kept import are_kept, degree
 from .observed import ObservedRobot, select_relation
 from .sensor_rows import DEGREE, SensorPlaces, has_exact_rates
-from .verdict import word
+from .verdict import Word, word
 
 INSTANCES = 5
 """Random instances at which a deficient rank is confirmed."""
@@ -54,16 +55,16 @@ TESTS = 3
 
 
 @dataclass(frozen=True)
-class Basis:
+class Basis(Record):
     """What the relations of an architecture rest on: how many are ``carried`` by links and joints, how many closed
     loops keep besides, and those merely ``observed``, in words."""
 
-    carried: int
-    kept: int
-    observed: tuple[str, ...]
-    held: float = 0.0
+    carried: Annotated[int, ""]
+    kept: Annotated[int, ""]
+    observed: Annotated[tuple[str, ...], ""]
+    held: Annotated[float, As("largest_defect_held")] = 0.0
     """The largest defect (sines, characteristic lengths) of a relation that counts as held."""
-    missed: float | None = None
+    missed: Annotated[float | None, As("smallest_defect_not_held")] = None
     """The smallest one of a relation that nearly holds and does not count."""
 
     @property
@@ -71,16 +72,6 @@ class Basis:
         """What nearly holds, or holds only nearly, in words; empty where nothing does."""
         text = f"; relations that miss by up to {self.held:.1e} count as held" if self.held > CLOSED else ""
         return text + ("" if self.missed is None else f"; a relation misses by {self.missed:.1e} and does not count")
-
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {
-            "carried": self.carried,
-            "kept": self.kept,
-            "observed": list(self.observed),
-            "largest_defect_held": self.held,
-            "smallest_defect_not_held": self.missed,
-        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -93,31 +84,17 @@ class ExactVerdict(Compared):
     """
 
     legs: tuple[str, ...]
-    verdict: str | None
-    rank: int | None
+    verdict: Annotated[str | None, Word | None]
+    rank: Annotated[int | None, ""]
     dof: int
-    exact: bool
-    instances: int
-    reason: str
-    proved: bool = False
-    chance: float = 0.0
-    basis: Basis | None = None
-    trivial: int | None = None
+    exact: Annotated[bool, ""]
+    instances: Annotated[int, ""]
+    reason: Annotated[str, ""]
+    proved: Annotated[bool, ""] = False
+    chance: Annotated[float, ""] = 0.0
+    basis: Annotated[Basis | None, As("relations")] = None
+    trivial: Annotated[int | None, int, OPTIONAL, "of a formation: how many unseen motions are trivial"] = None
     """Of a formation: how many independent unseen motions are trivial."""
-
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {
-            "verdict": self.verdict,
-            "exact": self.exact,
-            "rank": self.rank,
-            "instances": self.instances,
-            "reason": self.reason,
-            "proved": self.proved,
-            "chance": self.chance,
-            "relations": self.basis and self.basis.to_dict(),
-            **({} if self.trivial is None else {"trivial": self.trivial}),
-        }
 
 
 class ExactArchitecture:

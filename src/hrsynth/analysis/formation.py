@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import Annotated
 
 import numpy as np
 
@@ -86,16 +87,12 @@ def following(found: Iterable[Sensed], twists: Mapping[str, Numbers]) -> tuple[N
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Flex(Value):
+class Flex(Value, all_told=True):
     """``count`` independent motions of some links while all others rest and no measured value changes."""
 
     links: tuple[str, ...]
     count: int
     name: str
-
-    def to_dict(self) -> dict[str, object]:
-        """The record of the command line."""
-        return {"links": list(self.links), "count": self.count, "name": self.name}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -150,10 +147,10 @@ class Formation(Value):
     """What observations do not see of a formation at a configuration: trivial motions by name, and flexes; ``special``
     is the line or plane in which all points lie here that are sensed, and generically do not."""
 
-    bodies: tuple[str, ...]
-    trivial: tuple[str, ...]
-    flexes: tuple[Flex, ...]
-    special: str = ""
+    bodies: Annotated[tuple[str, ...], ""]
+    trivial: Annotated[tuple[str, ...], ""]
+    flexes: Annotated[tuple[Flex, ...], ""]
+    special: Annotated[str, "the line or plane that holds all sensed points here, but not generically"] = ""
     group: Similarities | None = None
     """All that the trivial motions make of what is sensed, where that is told by turns and scales about one place."""
 
@@ -166,15 +163,6 @@ class Formation(Value):
     def count(self) -> int:
         """How many independent flexes there are."""
         return sum(each.count for each in self.flexes)
-
-    def to_dict(self) -> dict[str, object]:
-        """The record of the command line."""
-        return {
-            "bodies": list(self.bodies),
-            "trivial": list(self.trivial),
-            "flexes": [each.to_dict() for each in self.flexes],
-            "special": self.special,
-        }
 
 
 def formation_at(

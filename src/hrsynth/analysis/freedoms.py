@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -10,6 +12,7 @@ from ..geometry.ranks import kernel_basis, range_basis, space_basis
 from ..geometry.vectors import Array, cross, orient_axis, unit
 from ..mechanism import JointType
 from ..mechanism.legs import LegDecomposition
+from ..records import As
 from ..results import Value
 from ..tolerances import NAMED
 
@@ -17,15 +20,13 @@ _AXES = "xyz"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Freedom(Value):
+class Freedom(Value, all_told=True):
     """A twist (vx, vy, vz, wx, wy, wz) at the platform frame's origin, base axes (m, rad), with its name."""
 
-    twist: Array
+    twist: Annotated[
+        Array, list[float], As(digits=12), "vx, vy, vz, wx, wy, wz at the platform frame's origin, base axes (m, rad)"
+    ]
     name: str
-
-    def to_dict(self) -> dict[str, object]:
-        """The record of the command line."""
-        return {"twist": [round(float(value), 12) + 0.0 for value in self.twist], "name": self.name}
 
 
 def name_freedoms(
@@ -63,7 +64,7 @@ def name_freedoms(
     return tuple(found)
 
 
-def point_text(point: Array) -> str:
+def point_text(point: Iterable[float]) -> str:
     """A point or a vector in words: ``(0.1 0 -0.7)``."""
     return "(" + " ".join(f"{0.0 if abs(value) < 1e-9 else value:.4g}" for value in point) + ")"
 

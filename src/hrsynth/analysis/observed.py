@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from numbers import Integral
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -25,11 +25,12 @@ from ..kinematics.sampling import Sample, Samples, sample
 from ..mechanism import Mechanism, Observation
 from ..mechanism.legs import LegDecomposition, decompose
 from ..mechanism.normal import NormalForm, normal_form
-from ..mechanism.observation import labels_of
+from ..mechanism.observation import ObservationRecord, labels_of
 from ..mechanism.observations.direction import Direction
 from ..mechanism.pose import RADIANS, ModeNumber, Pose, PoseForm
 from ..mechanism.sensors import default_observation, defaults_of, encoders, observation_of, reason
 from ..progress import tell
+from ..records import As, Record, Shown
 from ..results import Value, content
 
 if TYPE_CHECKING:
@@ -40,16 +41,50 @@ SAMPLES = 20
 """Configurations of a certificate and of a generic verdict."""
 
 
+UNLIMITED = "joints whose limits are not looked at, as they are parts of other joints"
+"""What records say of ``unlimited``."""
 LegsLike = str | int | Iterable[str | int] | None
 """Legs by their labels, or links, as a user gives them: one, several, a text with commas, ``all``; None: all."""
 
 
 @dataclass(frozen=True)
-class Mobility:
+class Mobility(Record, all_told=True):
     """Freedoms of a mechanism: all of them, and those that move neither the platform nor any default segment."""
 
     total: int
     idle: int
+
+
+class MobilityWritten(NamedTuple):
+    """Mobility in normal form, and that of the file's own links and joints."""
+
+    total: int
+    idle: int
+    as_written: Annotated[Mobility | None, "null if the file's own mechanism could not be sampled"]
+
+
+class WatchedAxis(ObservationRecord):
+    """An observation, its axis in the frame of its link, and why it was chosen."""
+
+    why: str
+
+
+class OperationModeRecord(NamedTuple):
+    """What the platform does in an operation mode."""
+
+    dof: int
+    motion: str
+    mobility: int
+
+
+class OtherMode(NamedTuple):
+    """Another operation mode that was met, what legs see there, and a pose in it."""
+
+    dof: int
+    motion: str
+    mobility: int
+    words: str
+    pose: Pose
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -59,7 +94,7 @@ class ObservedRobot(Value):
     robot: Mechanism
     normal: NormalForm
     anatomy: LegDecomposition
-    observed: tuple[Observation, ...]
+    observed: Annotated[tuple[Observation, ...], ""]
     everything: Samples
     """Samples for the question of all default segments, and besides of the observed ones and those the file names."""
     defaults: int
@@ -252,14 +287,10 @@ class ObservedRobot(Value):
         except HrsynthError:
             return None
 
-    def mobility_dict(self) -> dict[str, Any]:
-        """Mobility in normal form and as written, as the records of the command line have it."""
-        own, written = self.mobility, self.mobility_if_written
-        return {
-            "total": own.total,
-            "idle": own.idle,
-            "as_written": written and {"total": written.total, "idle": written.idle},
-        }
+    @property
+    def mobilities(self) -> MobilityWritten:
+        """Mobility in normal form and as written."""
+        return MobilityWritten(self.mobility.total, self.mobility.idle, self.mobility_if_written)
 
     @property
     def unlimited(self) -> tuple[str, ...]:
@@ -273,35 +304,38 @@ class ObservedRobot(Value):
         members = tuple(Sample(at, (), relation(at, question)) for at in self.configurations)
         return replace(drawn, question=question, members=members)
 
-    def to_dict(self) -> dict[str, Any]:
-        """What is observed, and from which link, as the records of the command line begin."""
-        return {"observed": [o.to_dict() for o in self.observed], "camera": self.mechanism.reference}
+    told_camera = Shown(str, lambda self: self.mechanism.reference, As("camera"), "the link from which it is observed")
 
     def watched(self) -> tuple[tuple[Observation, str], ...]:
         """What is observed, and why it is that."""
         return tuple((each, reason(self.anatomy, each)) for each in self.observed)
 
-    def watched_dict(self) -> list[dict[str, Any]]:
-        """The same as the records of the command line have it; axes in the frames of their links."""
-        return [{**o.to_dict(), "why": why} for o, why in self.watched()]
+    @property
+    def told_watched(self) -> list[WatchedAxis]:
+        """The same as JSON has it."""
+        return [{**each.to_dict(), "why": why} for each, why in self.watched()]
 
-    def modes_dict(self) -> dict[str, Any]:
-        """The samples' operation mode and the others that were met, as the records of the command line have them."""
+    @property
+    def operation_mode(self) -> OperationModeRecord:
+        """The samples' operation mode."""
+        own = self.everything.signature
+        return OperationModeRecord(own.dof, own.motion, own.mobility)
+
+    @property
+    def other_modes(self) -> list[OtherMode]:
+        """The other operation modes that were met."""
         drawn = self.everything
-        own, labels = drawn.signature, [o.leg for o in drawn.question.observations]
-        return {
-            "operation_mode": {"dof": own.dof, "motion": own.motion, "mobility": own.mobility},
-            "other_modes": [
-                {
-                    "dof": mode.signature.dof,
-                    "motion": mode.signature.motion,
-                    "mobility": mode.signature.mobility,
-                    "words": mode.beside(own, labels),
-                    "pose": Pose.of(mode.at.pose(drawn.question.platform)).to_dict(),
-                }
-                for mode in drawn.met
-            ],
-        }
+        labels = [o.leg for o in drawn.question.observations]
+        return [
+            OtherMode(
+                mode.signature.dof,
+                mode.signature.motion,
+                mode.signature.mobility,
+                mode.beside(drawn.signature, labels),
+                Pose.of(mode.at.pose(drawn.question.platform)),
+            )
+            for mode in drawn.met
+        ]
 
 
 CameraLike = str | Iterable[str] | None

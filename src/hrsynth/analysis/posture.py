@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.limits import flat_wrists, outside
 from ..kinematics.relation import Relation, relation, relation_of
 from ..mechanism.pose import Pose
+from ..records import OPTIONAL, As, Number, Record, Shown, recorded
 from ..results import Value
 from ..tolerances import PASSED_BY, RANK_GAP
 from .classes import (
@@ -37,14 +38,18 @@ UNDECIDED, REGULAR, CONSTRAINT = "undecided", "regular", "constraint"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Kinds(Value):
+class Kinds(Value, all_told=True):
     """What one relation says at a configuration: the freedoms that are seen, the gap of all ranks, the six counts (None
     where the gap is too small for a verdict) and the freedoms that are not seen."""
 
     rank: int
-    gap: float
+    gap: Annotated[float, "the smallest ratio of a singular value that counts to one that does not"]
     classes: Classes | None
     lost: tuple[Freedom, ...] = ()
+
+    type1 = Shown(bool | None, lambda self: self.classes and self.classes.type1)
+    type2 = Shown(bool | None, lambda self: self.classes and self.classes.type2)
+    type3 = Shown(bool | None, lambda self: self.classes and self.classes.type3)
 
     @property
     def state(self) -> str:
@@ -56,25 +61,9 @@ class Kinds(Value):
             return CONSTRAINT
         return "type3" if found.type3 else "type2" if found.type2 else "type1" if found.type1 else REGULAR
 
-    def types(self) -> dict[str, bool | None]:
-        """The three types, each null where it is not decided."""
-        return {
-            name: None if self.classes is None else getattr(self.classes, name) for name in ("type1", "type2", "type3")
-        }
-
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {
-            "rank": self.rank,
-            "gap": self.gap,
-            **self.types(),
-            "classes": self.classes and self.classes.to_dict(),
-            "lost": [freedom.to_dict() for freedom in self.lost],
-        }
-
 
 @dataclass(frozen=True)
-class Distances:
+class Distances(Record, all_told=True):
     """How far a configuration is from each kind (0: there); lengths in characteristic lengths.
 
     ``type2`` is the smallest singular value of Mᵀ on the feasible twists that are generically seen, ``type1`` one over
@@ -88,19 +77,16 @@ class Distances:
     type1: float | None
     constraints: float
     condition: float | None
-    millimetres: float | None
-    degrees: float | None
+    millimetres: Annotated[float | None, As("mm_per_degree")]
+    degrees: Annotated[float | None, As("degrees_per_degree")]
 
-    def to_dict(self) -> dict[str, float | None]:
-        """The record of the command line."""
-        return {
-            "type2": self.type2,
-            "type1": self.type1,
-            "constraints": self.constraints,
-            "condition": self.condition,
-            "mm_per_degree": self.millimetres,
-            "degrees_per_degree": self.degrees,
-        }
+
+class Constraint(NamedTuple):
+    """Whether the loops lose rank, and the freedoms that the platform has only here."""
+
+    singular: bool | None
+    rank_lost: int | None
+    gained: tuple[Freedom, ...]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -108,26 +94,38 @@ class Posture(Value):
     """All that is said of one configuration."""
 
     configuration: ClosedConfiguration
-    pose: Pose
-    mobility: Mobility
-    dof: int
-    hidden: Kinds
-    real: Kinds | None
+    pose: Annotated[Pose, ""]
+    mobility: Annotated[Mobility, ""]
+    dof: Annotated[int, ""]
+    hidden: Annotated[Kinds, As(flat=True, without=("rank",))]
+    real: Annotated[Kinds | None, "what the motors determine"]
     """The real robot with its own motors; None where it has none."""
-    distances: Distances
+    distances: Annotated[Distances, ""]
     gained: tuple[Freedom, ...] = ()
     """At a constraint singularity: the freedoms that the platform has here and not in general."""
-    redundant: tuple[Redundancy, ...] = ()
+    redundant: Annotated[tuple[Redundancy, ...], ""] = ()
     """Loop constraints that are redundant only here."""
-    formation: Formation | None = None
+    formation: Annotated[Formation | None, Formation, OPTIONAL] = None
     """Of a formation: what is not seen here; ``pose`` is that of its first body."""
 
+    rank_M = Shown(int, lambda self: self.hidden.rank)
+    condition = Shown(Number, lambda self: self.distances.condition)
+
+    @property
+    @recorded()
+    def constraint(self) -> Constraint:
+        """Whether the loops lose rank, and the freedoms that the platform has only here."""
+        lost = None if self.hidden.classes is None else self.hidden.classes.IIM
+        return Constraint(self.constraint_singular, lost, self.gained)
+
     @cached_property
+    @recorded()
     def beyond(self) -> tuple[str, ...]:
         """The joints that are beyond their limits."""
         return tuple(outside(self.configuration.twin, self.configuration.q))
 
     @cached_property
+    @recorded()
     def flat_wrists(self) -> dict[str, float]:
         """S joints that stand for several R which are (nearly, rad) at a singularity of their own, which the S does not
         have (docs/pages/theory.md, section 1)."""
@@ -147,29 +145,6 @@ class Posture(Value):
     def constraint_singular(self) -> bool | None:
         """Whether the loops have lost rank; None where that is not decided."""
         return None if self.hidden.classes is None else self.hidden.classes.IIM > 0
-
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        hidden = self.hidden.to_dict()
-        return {
-            "pose": self.pose.to_dict(),
-            "beyond": list(self.beyond),
-            "flat_wrists": self.flat_wrists,
-            "mobility": {"total": self.mobility.total, "idle": self.mobility.idle},
-            "dof": self.dof,
-            "rank_M": hidden.pop("rank"),
-            **hidden,
-            "condition": self.distances.condition,
-            "real": self.real and self.real.to_dict(),
-            "constraint": {
-                "singular": self.constraint_singular,
-                "rank_lost": None if self.hidden.classes is None else self.hidden.classes.IIM,
-                "gained": [freedom.to_dict() for freedom in self.gained],
-            },
-            "redundant": [each.to_dict() for each in self.redundant],
-            "distances": self.distances.to_dict(),
-            **({} if self.formation is None else {"formation": self.formation.to_dict()}),
-        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Literal, NamedTuple
 
 from ..errors import RankUndecided
 from ..geometry.ranks import Rank
+from ..kinematics.certificate import GAP
 from ..kinematics.relation import Relation, look, relation
 from ..kinematics.sampling import Samples
+from ..records import OPTIONAL, Shown, recorded
 from ..results import Result
 from ..tolerances import RANK_CUTOFF, RANK_GAP, SURELY_SOMETHING, SURELY_ZERO
 from .formation import Formation, formation_at
@@ -17,6 +19,7 @@ from .freedoms import Freedom, name_freedoms, point_text
 from .observed import ObservedRobot
 
 CONTROLLABLE, PARTIAL, BLIND = "controllable", "partially controllable", "uncontrollable"
+Word = Literal["controllable", "partially controllable", "uncontrollable", "nothing to control", "rigid", "flexible"]
 AT_REST = "nothing to control"
 """Of a platform that does not move, whatever its legs do."""
 ELSEWHERE = "with the platform at"
@@ -30,26 +33,36 @@ def word(rank: int, dof: int) -> str:
     return CONTROLLABLE if rank == dof else PARTIAL if rank else BLIND
 
 
+class Margin(NamedTuple):
+    """The smallest singular value that counts, the largest that does not, and where the cut is."""
+
+    counted: float
+    dropped: float
+    cutoff: float
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Verdict(Result, shown_as="verdict"):
     """What one set of observed legs sees of the platform, at generic configurations."""
 
-    legs: tuple[str, ...]
-    verdict: str
+    legs: Annotated[tuple[str, ...], ""]
+    verdict: Annotated[str, Word]
     dof: int
-    rank: int
-    lost: tuple[Freedom, ...]
-    gap: float
-    has_interaction_matrix: bool = True
+    rank: Annotated[int, ""]
+    lost: Annotated[tuple[Freedom, ...], ""]
+    gap: Annotated[float, GAP]
+    has_interaction_matrix: Annotated[bool, ""] = True
     """Whether Mᵀ exists: no observed direction moves while the platform rests."""
     counted: float = 1.0
     """The smallest singular value of the measured rates on ρ that counts as seen, at the sample where it is largest:
     single samples may lie near a singularity, whatever the dimensions."""
     dropped: float = 0.0
     """The largest that does not, at the sample where it is least."""
-    formation: Formation | None = None
+    formation: Annotated[Formation | None, Formation, OPTIONAL] = None
     """Of a formation: what is not seen, trivial motions and flexes; ``dof`` are the freedoms of all bodies."""
-    rank_at_zero: int | None = None
+    rank_at_zero: Annotated[
+        int | None, int, OPTIONAL, "at a zero configuration that shows fewer freedoms than others do"
+    ] = None
     """How many freedoms the zero configuration shows, where these are fewer than elsewhere (it is singular); None
     where they are as many, the number is not decided, or several bodies are asked of."""
 
@@ -74,25 +87,13 @@ class Verdict(Result, shown_as="verdict"):
         """The legs, the verdict and the rank."""
         return f"legs {', '.join(self.legs)}: {self.verdict}, rank {self.rank} of {self.dof}"
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {
-            "legs": list(self.legs),
-            "verdict": self.verdict,
-            "rank": self.rank,
-            "lost": [freedom.to_dict() for freedom in self.lost],
-            "gap": self.gap,
-            "has_interaction_matrix": self.has_interaction_matrix,
-            "interaction_matrix": self.has_interaction_matrix,
-            "margin": self.margin,
-            **({} if self.rank_at_zero is None else {"rank_at_zero": self.rank_at_zero}),
-            **({} if self.formation is None else {"formation": self.formation.to_dict()}),
-        }
+    interaction_matrix = Shown(bool, lambda self: self.has_interaction_matrix)
 
     @property
-    def margin(self) -> dict[str, float]:
-        """How far the verdict is from another, as the record of the command line has it."""
-        return {"counted": self.counted, "dropped": self.dropped, "cutoff": RANK_CUTOFF}
+    @recorded()
+    def margin(self) -> Margin:
+        """The smallest singular value that counts, the largest that does not, and where the cut is."""
+        return Margin(self.counted, self.dropped, RANK_CUTOFF)
 
 
 def verdict_of(setting: ObservedRobot, legs: Sequence[str], samples: Samples) -> Verdict:

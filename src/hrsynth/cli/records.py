@@ -1520,10 +1520,7 @@ class LintAnswer(Head, WrittenTo):
     unread: list[UnreadRecord]
 
 
-RECORDS: dict[str, Any] = {
-    "derive": Derive,
-    "legs": LegsAnswer,
-    "check": CheckAnswer,
+RECORDS: dict[str, Any] = dict.fromkeys(("derive", "legs", "check")) | {
     "singular": Singular,
     "advise": Advise,
     "branch": Branch,

@@ -4,15 +4,40 @@ from __future__ import annotations
 
 import json as javascript
 import sys
-from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, NotRequired, Union, get_args, get_origin, get_type_hints, is_typeddict
+from typing import Any, Literal, TypedDict, is_typeddict
 
+import hrsynth
+
+from .. import records
+from ..present.outputs import OUTPUTS
+from ..records import object_schema
 from .colour import say
 from .commands import Group, add_command
 from .options import NEEDED, Option
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-SIMPLE: dict[Any, str] = {str: "string", int: "integer", float: "number", bool: "boolean", NoneType: "null"}
+
+
+class Head(TypedDict):
+    """The fields with which every object begins."""
+
+    command: str
+    version: str
+
+
+class Platform(TypedDict):
+    """The link that is the platform (the first body of a formation); what chose it, and why."""
+
+    link: str
+    chosen: Literal["file", "option", "guess"]
+    reason: str
+
+
+class OfRobot(Head):
+    """The fields with which an answer about a robot begins."""
+
+    robot: str
+    platform: Platform
 
 
 def schema(command: str) -> dict[str, Any]:
@@ -20,43 +45,19 @@ def schema(command: str) -> dict[str, Any]:
     from .records import RECORDS
 
     parts: dict[str, Any] = {}
-    head = _of(RECORDS[command], parts)
-    return {"$schema": DIALECT, "title": f"hrsynth {command} --json", **head, "$defs": parts}
-
-
-def _of(kind: Any, parts: dict[str, Any]) -> dict[str, Any]:
-    """The schema of a type; what it is made of is added to ``parts``."""
-    values = get_args(kind)
-    if kind is Any:
-        return {}
-    if kind in SIMPLE:
-        return {"type": SIMPLE[kind]}
+    kind = RECORDS.get(command)
     if is_typeddict(kind):
-        if kind.__name__ not in parts:
-            parts[kind.__name__] = {}
-            fields = get_type_hints(kind, include_extras=True)
-            parts[kind.__name__] = {
-                "description": " ".join((kind.__doc__ or "").split()),
-                "type": "object",
-                "properties": {name: _of(each, parts) for name, each in fields.items()},
-                "required": sorted(
-                    name for name, each in fields.items() if kind.__total__ and get_origin(each) is not NotRequired
-                ),
-                "additionalProperties": False,
-            }
-        return {"$ref": f"#/$defs/{kind.__name__}"}
-    origin = get_origin(kind)
-    if origin is Annotated:
-        return {**_of(values[0], parts), "description": values[1]}
-    if origin is Literal:
-        return {"enum": list(values)}
-    if origin in (Union, UnionType):
-        return {"anyOf": [_of(each, parts) for each in values]}
-    if origin is list:
-        return {"type": "array", "items": _of(values[0], parts)}
-    if origin is dict:
-        return {"type": "object", "additionalProperties": _of(values[1], parts)}
-    return _of(values[0], parts)  # NotRequired
+        head, words = object_schema([kind], parts), kind.__doc__
+    else:
+        function = getattr(hrsynth, command)
+        kind = vars(sys.modules[function.__module__])[function.__annotations__["return"]]
+        head, words = object_schema([OfRobot, kind], parts), kind.__doc__
+        for file in OUTPUTS[command].files:
+            if file.option is not None and file.field is not None:
+                head["properties"][file.field] = records.schema(str | None, parts)
+                head["required"] = sorted([*head["required"], file.field])
+    told = {"title": f"hrsynth {command} --json", "description": " ".join((words or "").split())}
+    return {"$schema": DIALECT, **told, **head, "$defs": parts}
 
 
 def _commands() -> list[str]:

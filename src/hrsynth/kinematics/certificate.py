@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from ..errors import BadMechanism, NotMeasured
 from ..geometry.ranks import CLEAN, largest_angle, spectra
 from ..geometry.vectors import Array
 from ..mechanism import Mechanism
+from ..records import Number
 from ..results import Result
 from ..tolerances import FOLLOWED, RANK_GAP, SAME_RELATION, SOLVED
 from .configuration import ClosedConfiguration
@@ -35,36 +36,28 @@ class Mismatch:
     position: Array
 
 
+ANGLE = "the largest principal angle between two relations (rad)"
+GAP = "the smallest ratio of a singular value that counts to one that does not"
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Certificate(Result, shown_as="certificate"):
     """What was compared: configurations, the largest angle between ρ and ρ_H, the smallest rank gap, the largest
     residual at which the hidden robot follows; ``reason`` says why it did not pass."""
 
-    samples: int
-    discarded: int
-    largest_angle: float
-    smallest_gap: float
-    residual: float
-    passed: bool
-    reason: str
+    samples: Annotated[int, ""]
+    discarded: Annotated[int, ""]
+    largest_angle: Annotated[float, ANGLE]
+    smallest_gap: Annotated[float, Number, GAP]
+    residual: Annotated[float, ""]
+    passed: Annotated[bool, ""]
+    reason: Annotated[str, ""]
     mismatch: Mismatch | None = None
 
     def headline(self) -> str:
         """Whether it passed, and the largest angle."""
         passed = "passed" if self.passed else f"failed, {self.reason}"
         return f"{passed}: largest angle {self.largest_angle:.1e} at {self.samples} configurations"
-
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {
-            "samples": self.samples,
-            "discarded": self.discarded,
-            "largest_angle": self.largest_angle,
-            "smallest_gap": self.smallest_gap,
-            "residual": self.residual,
-            "passed": self.passed,
-            "reason": self.reason,
-        }
 
 
 def certify(

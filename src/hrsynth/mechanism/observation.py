@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar, Self
+from typing import ClassVar, NotRequired, Self, TypedDict
 
 import numpy as np
 
@@ -18,6 +18,19 @@ class Drawn:
 
     lines: tuple[Array, ...] = ()
     areas: tuple[Array, ...] = ()
+
+
+class ObservationRecord(TypedDict):
+    """An observation: its label (that of a leg if it is a segment), the link and the kind; the named camera that sees
+    it, and its point (m) and axis in the link's frame (null if there are none); the joint of an encoder."""
+
+    leg: str
+    link: str
+    kind: str
+    camera: str | None
+    at: list[float] | None
+    axis: list[float] | None
+    joint: NotRequired[str]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -131,8 +144,8 @@ class Observation(Value):
         seen_from = None if self.seen_from is None else into[self.seen_from]
         return replace(self, link=into[self.link], seen_from=seen_from)
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
+    def to_dict(self) -> ObservationRecord:
+        """Where it is, as JSON has it."""
         return {"leg": self.leg, "link": self.link, "kind": self.kind, "camera": None, "at": None, "axis": None}
 
     def differences(self, other: Observation, tolerance: float) -> list[str]:

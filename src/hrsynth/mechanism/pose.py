@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import Any, Protocol
+from typing import Annotated, Any, Protocol, TypedDict, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +19,7 @@ from ..budgets import FARTHEST_POSE, LARGEST_GRID
 from ..errors import BadRequest
 from ..geometry.vectors import Array, rotation_from_rpy
 from ..ranges import plain_number
+from ..records import FLAT, As, Record, recorded
 from ..results import Value
 from ..tolerances import AS_PRINTED, HALF_TURN
 
@@ -28,15 +29,15 @@ EXAMPLE = "x=0.02,y=0.1,z=-0.7, and phi=10deg or rpy=0.1/0/0"
 
 
 @dataclass(frozen=True)
-class Pose:
+class Pose(Record):
     """Parts of a platform's pose; None is free. ``phi`` is the turn from the zero configuration about the base frame's
     z (for a planar robot about the normal of its plane), ``rpy`` URDF's fixed-axis roll, pitch, yaw."""
 
-    x: float | None = None
-    y: float | None = None
-    z: float | None = None
-    phi: float | None = None
-    rpy: tuple[float, float, float] | None = None
+    x: Annotated[float | None, "null: free"] = None
+    y: Annotated[float | None, "null: free"] = None
+    z: Annotated[float | None, "null: free"] = None
+    phi: Annotated[float | None, float, As(optional=True), "there if it was given"] = None
+    rpy: Annotated[tuple[float, float, float] | None, "roll, pitch, yaw about fixed axes"] = None
     shown: str = field(default="", repr=False, compare=False)
     """How it was typed, or is told where a pose was typed in that manner."""
 
@@ -85,16 +86,6 @@ class Pose:
     def rotation(self) -> Array | None:
         """R_BP (3, 3) if rpy is given."""
         return None if self.rpy is None else rotation_from_rpy(*self.rpy)
-
-    def to_dict(self) -> dict[str, Any]:
-        """x, y, z and rpy (null where free), phi where it is given."""
-        record: dict[str, Any] = {
-            "x": self.x,
-            "y": self.y,
-            "z": self.z,
-            "rpy": None if self.rpy is None else list(self.rpy),
-        }
-        return record if self.phi is None else {**record, "phi": self.phi}
 
     def __str__(self) -> str:
         return self.shown or write_parts(self.given)
@@ -216,6 +207,25 @@ def asked_pose(given: PoseLike) -> Pose | ModeNumber:
     return ModeNumber(int(number))
 
 
+class GridValues(TypedDict, total=False):
+    """The values of the parts that vary."""
+
+    x: list[float]
+    y: list[float]
+    z: list[float]
+    phi: list[float]
+
+
+class FixedParts(TypedDict, total=False):
+    """The parts of the pose that a grid holds fixed."""
+
+    x: float
+    y: float
+    z: float
+    phi: float
+    rpy: list[float]
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Grid(Value):
     """A line, plane or box of poses: the parts that vary with their values, over a pose that gives the rest."""
@@ -254,15 +264,18 @@ class Grid(Value):
         ranges = [f"{name}={values[0]:.6g}:{values[-1]:.6g}:{len(values)}" for name, values in self.axes]
         return ",".join([*ranges, *([str(self.fixed)] if self.fixed.given else [])])
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of what varies and what is held."""
-        fixed = {name: values[0] for name, values in self.fixed.given.items() if name in SCALARS}
-        rpy = {} if self.fixed.rpy is None else {"rpy": list(self.fixed.rpy)}
-        return {
-            "axes": list(self.names),
-            **{name: values.tolist() for name, values in self.axes},
-            "fixed": {**fixed, **rpy},
-        }
+    @property
+    @recorded(FLAT)
+    def told_values(self) -> GridValues:
+        """The values of the parts that vary."""
+        return cast(GridValues, dict(self.axes))
+
+    @property
+    @recorded(As("fixed"))
+    def told_fixed(self) -> FixedParts:
+        """The parts of the pose that the grid holds fixed."""
+        parts = {name: values if name == "rpy" else values[0] for name, values in self.fixed.given.items()}
+        return cast(FixedParts, parts)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -275,6 +288,7 @@ class Grid(Value):
         return len(self.axes)
 
     @property
+    @recorded(As("axes"))
     def names(self) -> tuple[str, ...]:
         """The parts that vary, in order."""
         return tuple(name for name, _ in self.axes)

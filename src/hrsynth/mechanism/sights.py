@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from ..geometry.jets import Jet
 from ..geometry.vectors import Array, Numbers, dot, frozen, hat, inverse, perpendicular, transform, unit
 from ..results import Value
 from ..tolerances import NEAREST_SEEN, SAME_POINT
-from .observation import Drawn, Observation
+from .observation import Drawn, Observation, ObservationRecord
 
 AT_CENTRE = frozen(np.eye(4))
 RING = 48
@@ -385,10 +385,10 @@ class CameraObservation(Observation):
             camera=self.camera and self.camera.carried_by(into, poses),
         )
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> ObservationRecord:
         return {
             **super().to_dict(),
-            "camera": self.camera and self.camera.name,
+            "camera": None if self.camera is None else self.camera.name,
             "at": self.at.tolist() if "at" in self.needs else None,
             "axis": None if self.axis is None else self.axis.tolist(),
         }

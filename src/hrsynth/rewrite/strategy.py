@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Annotated, Any, Protocol
 
+from ..kinematics.certificate import ANGLE
 from ..mechanism import Mechanism
 from ..mechanism.observation import labels_of
 from ..progress import tell
+from ..records import Record
 from .evidence import Evidence
 from .rule import Proposal, Refusal, Rule, Stage
 from .rules import rules
@@ -39,17 +41,17 @@ Check = Callable[[Mechanism, tuple[str, ...]], Comparison]
 
 
 @dataclass(frozen=True)
-class Step:
+class Step(Record):
     """One attempt: the rule, the leg (None: all), whether it was accepted, why, and the angle if it was measured;
     ``state`` is what an accepted rewriting left behind, ``always`` whether the rule holds for every robot, ``keeps``
     where it keeps ρ at singular configurations too, ``bodies`` the links, besides the platform, whose twists must not
     change, ``taken_back`` whether it served only for a proposal that was not kept."""
 
-    rule: str
-    leg: str | None
-    accepted: bool
-    reason: str
-    largest_angle: float | None
+    rule: Annotated[str, ""]
+    leg: Annotated[str | None, ""]
+    accepted: Annotated[bool, ""]
+    reason: Annotated[str, ""]
+    largest_angle: Annotated[float | None, ANGLE]
     state: State | None = field(default=None, compare=False, repr=False)
     always: bool = field(default=False, compare=False, repr=False)
     keeps: tuple[str, ...] = field(default=(), compare=False, repr=False)

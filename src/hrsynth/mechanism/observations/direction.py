@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from ...errors import BadMechanism
 from ...geometry.screws import couple, normals
 from ...geometry.vectors import Array, Numbers, cross, frozen, hat, unit
 from ..images import tilt_vector
-from ..observation import Observation
+from ..observation import Observation, ObservationRecord
 from ..sights import HeldPlace, Sighting, VirtualJoint, gimbal, relative_pose, turned_across
 
 
@@ -118,7 +118,7 @@ class SeenAxis(Observation):
         turned = relative_pose(self.link, into, poses)[:3, :3] @ self.direction
         return replace(super().carried_by(into, poses), direction=turned)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> ObservationRecord:
         return {**super().to_dict(), "axis": self.direction.tolist()}
 
     def differences(self, other: Observation, tolerance: float) -> list[str]:

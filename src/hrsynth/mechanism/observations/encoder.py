@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
 from ...geometry.screws import point_velocity
 from ...geometry.so3 import wrap_angle
 from ...geometry.vectors import Array, cross, transform, unit
-from ..observation import Drawn, Observation
+from ..observation import Drawn, Observation, ObservationRecord
 from ..sights import relative_pose
 
 
@@ -36,7 +36,7 @@ class Encoder(Observation):
     def key(self) -> tuple[str, ...]:
         return (self.joint, type(self).__name__, self.link)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> ObservationRecord:
         return {**super().to_dict(), "joint": self.joint}
 
 

@@ -132,11 +132,8 @@ def describe_watched(found: ObservedRobot) -> dict[str, list[str]]:
     told: dict[str, list[str]] = {}
     for o, why in found.watched():
         said = o.to_dict()
-        where = "".join(
-            f" {word} {point_text(said[key])}"
-            for word, key in (("at", "at"), ("along", "axis"))
-            if said[key] is not None
-        )
+        places = {"at": said["at"], "along": said["axis"]}
+        where = "".join(f" {word} {point_text(at)}" for word, at in places.items() if at is not None)
         what = o.link if o.by_segment else describe_observation(o)
         told.setdefault(o.leg, []).append(f"{what}{where}{' of its frame' * bool(where)}, {why}")
     return told

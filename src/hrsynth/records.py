@@ -1,0 +1,247 @@
+"""What a result tells, said once beside its values: JSON, JSON schema, reference and rows of tables follow from that.
+
+A member of a record is
+
+* a field of a dataclass that is annotated with more than its type: ``Annotated[float, As("time_s"), "when it ended"]``.
+  Of what stands behind the type, a text says what it is, :class:`As` how it is told, and anything else is its type in
+  JSON where that differs: ``Annotated[Array, list[float], "low ends (m, rad)"]``;
+* a property under :func:`recorded`;
+* :class:`Shown`, a value that only the record has.
+
+Named tuples and typed dictionaries, whose members are all told, stand for what has no class of its own.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+from math import degrees, isfinite
+from pathlib import PurePath
+from types import NoneType, SimpleNamespace, UnionType
+from typing import (
+    Annotated,
+    Any,
+    ClassVar,
+    Literal,
+    NotRequired,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+    is_typeddict,
+)
+
+Json = Any
+Number = float | None
+"""A number, null where there is none or it is infinite."""
+Table = list[Any]
+"""Arrays over a grid, nested in the order of its axes."""
+SIMPLE: dict[Any, str] = {str: "string", int: "integer", float: "number", bool: "boolean", NoneType: "null"}
+MM, DEG = 1e3, degrees(1.0)
+"""Scales of what is told in millimetres or degrees."""
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+@dataclass(frozen=True)
+class As:
+    """How a member is told: under which ``name``, times a ``scale``, rounded to ``digits``; ``flat``: its own members,
+    but those ``without``, stand in its place; ``optional``: it is left out where it is None."""
+
+    name: str | None = None
+    scale: float | None = None
+    digits: int | None = None
+    flat: bool = False
+    without: tuple[str, ...] = ()
+    optional: bool = False
+
+
+FLAT, OPTIONAL = As(flat=True), As(optional=True)
+
+
+@dataclass(frozen=True)
+class Member:
+    """A member of a record: where its value comes from, its type in JSON, how it is told, what it is."""
+
+    name: str
+    attribute: str
+    kind: Any
+    how: As
+    words: str = ""
+
+
+class Record:
+    """What tells its members as JSON; all fields of a dataclass that is declared ``all_told``."""
+
+    all_told: ClassVar = False
+
+    def __init_subclass__(cls, all_told: bool = False, **more: Any) -> None:
+        super().__init_subclass__(**more)
+        cls.all_told = all_told
+
+    def to_dict(self) -> Json:
+        """The members by name, as JSON has them: null for what is not finite."""
+        return _told(self)
+
+    def to_row(self) -> dict[str, Any]:
+        """The same in one level, a row of a table (``pandas.DataFrame([found.to_row(), ...])``): members of members are
+        named with dots."""
+        return dict(_flat(self.to_dict()))
+
+
+class Shown:
+    """A value that only the record has: its type in JSON, how it is made of what has it, and as in an annotation."""
+
+    def __init__(self, kind: Any, get: Callable[[Any], Any], *extras: Any) -> None:
+        self.kind, self.get, self.extras = kind, get, extras
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    def __get__(self, instance: Any, owner: type | None = None) -> Any:
+        return self if instance is None else self.get(instance)
+
+
+def recorded(*extras: Any) -> Callable[[F], F]:
+    """A property that the record has too: ``@property`` stands above, what is told as in an annotation in brackets."""
+
+    def marked(function: F) -> F:
+        function.recorded = extras  # type: ignore[attr-defined]
+        return function
+
+    return marked
+
+
+def _told(value: Any) -> dict[str, Any]:
+    """The members of a record or a named tuple."""
+    found: dict[str, Any] = {}
+    for member in members(type(value)):  # type: ignore[arg-type]
+        part = plain(getattr(value, member.attribute), member.how)
+        if member.how.flat:
+            found |= {name: each for name, each in (part or {}).items() if name not in member.how.without}
+        elif part is not None or not member.how.optional:
+            found[member.name] = part
+    return found
+
+
+def plain(value: Any, how: As = As()) -> Any:
+    """A value as JSON has it."""
+    if value is None or isinstance(value, bool | str):
+        return value
+    if hasattr(value, "to_dict"):
+        return value.to_dict()
+    if isinstance(value, Mapping):
+        return {name: plain(each, how) for name, each in value.items()}
+    if hasattr(value, "_fields"):
+        return _told(value)
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, float):
+        value = value if how.scale is None else how.scale * value
+        value = value if how.digits is None else round(value, how.digits) + 0.0
+        return value if isfinite(value) else None
+    if isinstance(value, tuple | list):
+        return [plain(each, how) for each in value]
+    return str(value) if isinstance(value, PurePath) else value
+
+
+def _flat(fields: Mapping[str, Any], at: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in fields.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{at}{name}.")
+        else:
+            yield f"{at}{name}", value
+
+
+@cache
+def members(kind: type) -> tuple[Member, ...]:
+    """The members of a class of records, of its bases first."""
+    if is_typeddict(kind):
+        hints = get_type_hints(kind, include_extras=True)
+        every = [_member(name, hint) for name, hint in hints.items()]
+        return tuple(each if kind.__total__ else replace(each, how=OPTIONAL) for each in every)  # type: ignore[attr-defined]
+    found: dict[str, Member] = {}
+    for base in reversed(kind.__mro__):
+        known = vars(base).get("__annotations__", {})
+        named = issubclass(base, tuple) or vars(base).get("all_told", False)
+        told = {name: hint for name, hint in known.items() if named or str(hint).startswith("Annotated[")}
+        place = vars(sys.modules[base.__module__])
+        hints = get_type_hints(SimpleNamespace(__annotations__=told), place, include_extras=True)
+        found |= {name: _member(name, hint) for name, hint in hints.items()}
+        for name, value in vars(base).items():
+            if isinstance(value, Shown):
+                found[name] = _member(name, Annotated[(value.kind, "", *value.extras)])
+                continue
+            function: Any = getattr(value, "fget", getattr(value, "func", None))
+            if isinstance(value, property | cached_property) and hasattr(function, "recorded"):
+                hint = get_type_hints(function, include_extras=True)["return"]
+                found[name] = _member(name, Annotated[(hint, "", *function.recorded)], function.__doc__ or "")
+    return tuple(found.values())
+
+
+def _member(attribute: str, hint: Any, doc: str = "") -> Member:
+    """What a hint says of a member."""
+    how = OPTIONAL if get_origin(hint) is NotRequired else As()
+    if get_origin(hint) is NotRequired:
+        (hint,) = get_args(hint)
+    kind, *extras = get_args(hint) if get_origin(hint) is Annotated else (hint,)
+    words = " ".join(doc.partition("\n\n")[0].split())
+    for each in extras:
+        if isinstance(each, As):
+            how = each
+        elif isinstance(each, str):
+            words = each or words
+        else:
+            kind = each
+    return Member(how.name or attribute, attribute, kind, how, words)
+
+
+def schema(kind: Any, parts: dict[str, Any]) -> dict[str, Any]:
+    """The JSON schema of a type; the classes that it is made of are added to ``parts``."""
+    if kind is Any:
+        return {}
+    if kind in SIMPLE:
+        return {"type": SIMPLE[kind]}
+    origin, values = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        member = _member("", kind)
+        return {**schema(member.kind, parts), "description": member.words}
+    if origin is Literal:
+        return {"enum": list(values)}
+    if origin in (Union, UnionType):
+        return {"anyOf": [schema(each, parts) for each in values]}
+    if origin in (list, tuple, Sequence):
+        return {"type": "array", "items": schema(values[0], parts)}
+    if origin in (dict, Mapping):
+        return {"type": "object", "additionalProperties": schema(values[1], parts)}
+    kind = told_type(kind)
+    if kind.__name__ not in parts:
+        parts[kind.__name__] = {}
+        parts[kind.__name__] = {"description": " ".join((kind.__doc__ or "").split()), **object_schema([kind], parts)}
+    return {"$ref": f"#/$defs/{kind.__name__}"}
+
+
+def object_schema(kinds: Sequence[Any], parts: dict[str, Any]) -> dict[str, Any]:
+    """The JSON schema of one object with the members of several classes."""
+    properties: dict[str, Any] = {}
+    required: set[str] = set()
+    for kind in kinds:
+        for member in members(told_type(kind)):
+            if not member.how.flat:
+                told = {"description": member.words} if member.words else {}
+                properties[member.name] = {**schema(member.kind, parts), **told}
+                required |= set() if member.how.optional else {member.name}
+                continue
+            several = [each for each in get_args(member.kind) or (member.kind,) if each is not NoneType]
+            inner = object_schema(several, parts)
+            properties |= {name: each for name, each in inner["properties"].items() if name not in member.how.without}
+            required |= set() if NoneType in get_args(member.kind) else {*inner["required"]} - {*member.how.without}
+    return {"type": "object", "properties": properties, "required": sorted(required), "additionalProperties": False}
+
+
+def told_type(kind: Any) -> Any:
+    """The class whose members are told of another: itself, or what its own ``to_dict`` says that it gives."""
+    own = getattr(kind, "to_dict", Record.to_dict)
+    return kind if own is Record.to_dict else get_type_hints(own)["return"]
