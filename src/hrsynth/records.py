@@ -40,6 +40,9 @@ Number = float | None
 Table = list[Any]
 """Arrays over a grid, nested in the order of its axes."""
 SIMPLE: dict[Any, str] = {str: "string", int: "integer", float: "number", bool: "boolean", NoneType: "null"}
+ANGLE = "the largest principal angle between two relations (rad)"
+GAP = "the smallest ratio of a singular value that counts to one that does not"
+"""What is said of numbers that many records hold."""
 MM, DEG = 1e3, degrees(1.0)
 """Scales of what is told in millimetres or degrees."""
 F = TypeVar("F", bound=Callable[..., Any])
@@ -216,7 +219,8 @@ def schema(kind: Any, parts: dict[str, Any]) -> dict[str, Any]:
         return {"type": "array", "items": schema(values[0], parts)}
     if origin in (dict, Mapping):
         return {"type": "object", "additionalProperties": schema(values[1], parts)}
-    kind = told_type(kind)
+    if told_type(kind) is not kind:
+        return schema(told_type(kind), parts)
     if kind.__name__ not in parts:
         parts[kind.__name__] = {}
         parts[kind.__name__] = {"description": " ".join((kind.__doc__ or "").split()), **object_schema([kind], parts)}

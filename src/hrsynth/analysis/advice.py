@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations, islice
 from math import comb
-from typing import Any
+from typing import Annotated, Literal, NotRequired, TypedDict
 
 import numpy as np
 
@@ -21,14 +21,33 @@ from ..mechanism.observations import kinds
 from ..mechanism.sensors import encoders, observation_of, observed_line
 from ..progress import tell
 from ..ranges import plain_number
+from ..records import FLAT, GAP, OPTIONAL, As, Shown, recorded
 from ..results import Result, Value
 from ..tolerances import RANK_CUTOFF, SAME_PRICE, SAME_RELATION
+from .freedoms import Freedom
 from .observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike, as_robot, as_texts, restrict_samples
 from .question import question
-from .verdict import AT_REST, CONTROLLABLE, Verdict, verdict_of
+from .verdict import AT_REST, CONTROLLABLE, Verdict, Word, verdict_of
 
 AXES = {JointType.UNIVERSAL: ("first", "second"), JointType.CYLINDRICAL: ("slide", "turn")}
 """The names of the coordinates of joints that have two."""
+
+
+Kind = Literal["leg", "direction", "line", "encoder", "offered"]
+
+
+class FurtherRecord(TypedDict):
+    """A measurement that could be added. An encoder has `actuated`, and as its `axis` the word for the coordinate that
+    it reads (null if there is only one); others have the `link`, and a point `at` (m) and an `axis` in its frame (null
+    if there are none)."""
+
+    kind: Kind
+    of: Annotated[str, "the leg, the link, the joint, or the words of --see"]
+    leg: Annotated[str | None, "null: of a joint or a link inside the platform"]
+    link: NotRequired[str]
+    at: NotRequired[list[float] | None]
+    axis: NotRequired[list[float] | str | None]
+    actuated: NotRequired[bool]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -41,7 +60,7 @@ class FurtherMeasurement(Value):
     a motor drives the joint.
     """
 
-    kind: str
+    kind: Kind
     of: str
     observation: Observation
     leg: str | None
@@ -55,13 +74,13 @@ class FurtherMeasurement(Value):
         which = {"first": " (first axis)", "second": " (second axis)", None: ""}
         return f"{self.of}{star}{which.get(self.axis, f' ({self.axis})')}"
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        record: dict[str, Any] = {"kind": self.kind, "of": self.of, "leg": self.leg}
+    def to_dict(self) -> FurtherRecord:
+        """An encoder has the coordinate that it reads, others have their link, point and axis."""
+        record: FurtherRecord = {"kind": self.kind, "of": self.of, "leg": self.leg}
         if self.kind == "encoder":
-            return {**record, "axis": self.axis, "actuated": self.actuated}
+            return {**record, "axis": self.axis, "actuated": bool(self.actuated)}
         seen = self.observation.to_dict()
-        return {**record, **{name: seen[name] for name in ("link", "at", "axis")}}
+        return {**record, "link": seen["link"], "at": seen["at"], "axis": seen["axis"]}
 
 
 def candidates(setting: ObservedRobot, offered: Sequence[str] = ()) -> tuple[FurtherMeasurement, ...]:
@@ -142,21 +161,15 @@ BATCH = 2000
 class Cure(Value):
     """A set of measurements, and the verdict with them at all samples."""
 
-    measurements: tuple[FurtherMeasurement, ...]
+    measurements: Annotated[tuple[FurtherMeasurement, ...], ""]
     verdict: Verdict
-    price: float
+    price: Annotated[float, ""]
     """Of all of them together; each is 1 where nothing else is said."""
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {
-            "measurements": [each.to_dict() for each in self.measurements],
-            "verdict": self.verdict.verdict,
-            "rank": self.verdict.rank,
-            "gap": self.verdict.gap,
-            "price": self.price,
-            **({} if self.verdict.rank_at_zero is None else {"rank_at_zero": self.verdict.rank_at_zero}),
-        }
+    told_verdict = Shown(Word, lambda self: self.verdict.verdict, As("verdict"))
+    rank = Shown(int, lambda self: self.verdict.rank)
+    gap = Shown(float, lambda self: self.verdict.gap, GAP)
+    rank_at_zero = Shown(int, lambda self: self.verdict.rank_at_zero, OPTIONAL)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -164,13 +177,13 @@ class Advice(Result, shown_as="advise"):
     """What is missing. ``now`` is the present verdict; ``sets`` are all the cheapest sets of the best rank that can be
     reached (the smallest ones if all prices are equal), empty if nothing is missing or nothing helps."""
 
-    setting: ObservedRobot
+    setting: Annotated[ObservedRobot, FLAT]
     now: Verdict
-    sets: tuple[Cure, ...]
-    tried: int
-    complete: bool
+    sets: Annotated[tuple[Cure, ...], ""]
+    tried: Annotated[int, ""]
+    complete: Annotated[bool, ""]
     """Whether every set of this size and of all smaller ones was tried, and none was left undecided."""
-    undecided: int = 0
+    undecided: Annotated[int, ""] = 0
     """Sets that were promising at the probes, but whose rank has no clear gap at the samples."""
 
     @property
@@ -179,6 +192,7 @@ class Advice(Result, shown_as="advise"):
         return self.setting.robot.name
 
     @property
+    @recorded()
     def nothing_missing(self) -> bool:
         """Whether the robot is controllable as it is, or has nothing to control."""
         return self.now.verdict in (CONTROLLABLE, AT_REST)
@@ -189,6 +203,7 @@ class Advice(Result, shown_as="advise"):
         return bool(self.sets) and self.sets[0].verdict.verdict == CONTROLLABLE
 
     @property
+    @recorded()
     def size(self) -> int:
         """Measurements of the smallest set."""
         return min((len(each.measurements) for each in self.sets), default=0)
@@ -198,22 +213,10 @@ class Advice(Result, shown_as="advise"):
         found = "nothing is missing" if self.nothing_missing else f"{len(self.sets)} sets of {self.size} more"
         return f"{self.setting.headline()}: {self.now.verdict}, {found}"
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        now = self.now
-        return {
-            **self.setting.to_dict(),
-            "verdict": now.verdict,
-            "rank": now.rank,
-            "dof": now.dof,
-            "lost": [freedom.to_dict() for freedom in now.lost],
-            "nothing_missing": self.nothing_missing,
-            "sets": [each.to_dict() for each in self.sets],
-            "size": self.size,
-            "tried": self.tried,
-            "complete": self.complete,
-            "undecided": self.undecided,
-        }
+    verdict = Shown(Word, lambda self: self.now.verdict)
+    rank = Shown(int, lambda self: self.now.rank)
+    dof = Shown(int, lambda self: self.now.dof)
+    lost = Shown(tuple[Freedom, ...], lambda self: self.now.lost)
 
 
 @question()

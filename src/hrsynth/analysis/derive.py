@@ -12,7 +12,7 @@ from ..description.tree import spanning
 from ..errors import BadMechanism, BadRequest, NotCertified
 from ..geometry.ranks import range_basis
 from ..geometry.vectors import Array
-from ..kinematics.certificate import ANGLE, Certificate, certify
+from ..kinematics.certificate import Certificate, certify
 from ..kinematics.sampling import Samples
 from ..mechanism import Mechanism
 from ..mechanism.legs import LegDecomposition, decompose
@@ -20,7 +20,7 @@ from ..mechanism.normal import normal_form
 from ..mechanism.notation import Architecture
 from ..mechanism.observations.direction import Direction
 from ..progress import tell
-from ..records import FLAT, As, Shown, recorded
+from ..records import ANGLE, FLAT, As, Shown, recorded
 from ..results import Result, Value
 from ..rewrite.evidence import Evidence
 from ..rewrite.state import State

@@ -8,10 +8,9 @@ from typing import Annotated, Literal, NamedTuple
 
 from ..errors import RankUndecided
 from ..geometry.ranks import Rank
-from ..kinematics.certificate import GAP
 from ..kinematics.relation import Relation, look, relation
 from ..kinematics.sampling import Samples
-from ..records import OPTIONAL, Shown, recorded
+from ..records import GAP, OPTIONAL, Shown, recorded
 from ..results import Result
 from ..tolerances import RANK_CUTOFF, RANK_GAP, SURELY_SOMETHING, SURELY_ZERO
 from .formation import Formation, formation_at

@@ -1520,13 +1520,8 @@ class LintAnswer(Head, WrittenTo):
     unread: list[UnreadRecord]
 
 
-RECORDS: dict[str, Any] = dict.fromkeys(("derive", "legs", "check")) | {
-    "singular": Singular,
-    "advise": Advise,
+RECORDS: dict[str, Any] = dict.fromkeys(("derive", "legs", "check", "modes", "atlas", "path", "singular", "advise")) | {
     "branch": Branch,
-    "modes": AssemblyModesRecord,
-    "atlas": AtlasAnswer,
-    "path": Path,
     "servo": Servo,
     "endings": EndingsAnswer,
     "basins": BasinsAnswer,

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json as javascript
 import sys
+from collections.abc import Callable
 from typing import Any, Literal, TypedDict, is_typeddict
 
 import hrsynth
 
 from .. import records
 from ..present.outputs import OUTPUTS
+from ..present.outputs import function as maker
 from ..records import object_schema
 from .colour import say
 from .commands import Group, add_command
@@ -50,14 +52,22 @@ def schema(command: str) -> dict[str, Any]:
         head, words = object_schema([kind], parts), kind.__doc__
     else:
         function = getattr(hrsynth, command)
-        kind = vars(sys.modules[function.__module__])[function.__annotations__["return"]]
+        kind = _answer(function)
         head, words = object_schema([OfRobot, kind], parts), kind.__doc__
         for file in OUTPUTS[command].files:
             if file.option is not None and file.field is not None:
                 head["properties"][file.field] = records.schema(str | None, parts)
                 head["required"] = sorted([*head["required"], file.field])
+            if file.record is not None and file.computed is not None:
+                head["properties"][file.record] = records.schema(_answer(maker(file.computed)) | None, parts)
+                head["required"] = sorted([*head["required"], file.record])
     told = {"title": f"hrsynth {command} --json", "description": " ".join((words or "").split())}
     return {"$schema": DIALECT, **told, **head, "$defs": parts}
+
+
+def _answer(function: Callable[..., Any]) -> Any:
+    """The class of what a function answers."""
+    return vars(sys.modules[function.__module__])[function.__annotations__["return"]]
 
 
 def _commands() -> list[str]:

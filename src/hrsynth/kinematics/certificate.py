@@ -16,7 +16,7 @@ from ..errors import BadMechanism, NotMeasured
 from ..geometry.ranks import CLEAN, largest_angle, spectra
 from ..geometry.vectors import Array
 from ..mechanism import Mechanism
-from ..records import Number
+from ..records import ANGLE, GAP, Number
 from ..results import Result
 from ..tolerances import FOLLOWED, RANK_GAP, SAME_RELATION, SOLVED
 from .configuration import ClosedConfiguration
@@ -34,10 +34,6 @@ class Mismatch:
     real: Relation
     hidden: Relation
     position: Array
-
-
-ANGLE = "the largest principal angle between two relations (rad)"
-GAP = "the smallest ratio of a singular value that counts to one that does not"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -15,28 +15,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from ..geometry.balls import Field, around
 from ..geometry.so3 import logarithm
 from ..geometry.vectors import Array, dot, inverse, plane_axes
+from ..records import As, Number, Record
 from ..tolerances import OUT_OF_REACH, SAME_GEOMETRY
 from .ways import Part
 
 
 @dataclass(frozen=True)
-class Miss:
+class Miss(Record, all_told=True):
     """Why a leg does not close, and by how much at least (m, or rad)."""
 
-    words: str
-    by: float
+    words: Annotated[str, As("reason")]
+    by: Annotated[float, Number]
     unit: str = "m"
-
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {"reason": self.words, "by": self.by, "unit": self.unit}
 
     def __str__(self) -> str:
         return f"{self.words} (out of reach by {self.by:.3g} {self.unit})"

@@ -37,7 +37,7 @@ class DrawnSection:
     reason: str | None
 
     def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
+        """The section, or why there is none."""
         return {"reason": self.reason} if self.found is None else self.found[0].to_dict()
 
 

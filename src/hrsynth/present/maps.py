@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..analysis.check import MEASURES, UNREACHABLE
 from ..analysis.posture import CONSTRAINT, UNDECIDED
+from ..analysis.singularity.locus import Locus
 from ..errors import BadRequest
 from ..geometry.vectors import Array
 from ..mechanism.pose import PARTS
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
     from ..analysis.accuracy.error_map import ErrorMap as ErrorField
     from ..analysis.check import Check, GridCheck
     from ..analysis.observed import ObservedRobot
-    from ..analysis.singularity.locus import Locus, SingularityMap
+    from ..analysis.singularity.locus import SingularityMap
     from ..analysis.singularity.singular import Singularity
     from ..kinematics.platform_motion import PlatformMotion
     from ..mechanism.pose import Grid, Pose

@@ -11,11 +11,10 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, Protocol
 
-from ..kinematics.certificate import ANGLE
 from ..mechanism import Mechanism
 from ..mechanism.observation import labels_of
 from ..progress import tell
-from ..records import Record
+from ..records import ANGLE, Record
 from .evidence import Evidence
 from .rule import Proposal, Refusal, Rule, Stage
 from .rules import rules

@@ -307,13 +307,6 @@ def singular(kind: str, rng: np.random.Generator) -> SystemModes:
     return solve(Planar(tuple(curves), tips, np.eye(4)))
 
 
-def test_modes_are_plain_numbers_as_a_record():
-    record = solve(draw("planar, three circles", 0).system).to_dict()
-    assert record["complex"] == 6
-    assert len(record["modes"]) in (2, 4, 6)
-    assert np.shape(record["modes"][0]["pose"]) == (4, 4)
-
-
 @pytest.mark.parametrize("apart", [0.0, 1e-17, 1e-16, 1e-15])
 @pytest.mark.parametrize("seed", range(4))
 def test_centres_that_are_one_but_for_rounding_give_no_size(seed: int, apart: float):

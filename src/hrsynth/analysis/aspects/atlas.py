@@ -11,13 +11,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations, pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from ...budgets import ATLAS_INTERVALS
 from ...errors import PoseNotReached
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism.pose import ModeNumber, PoseLike
 from ...progress import tell
+from ...records import FLAT, As, Shown, recorded
 from ...results import Result, Value
 from ...tolerances import FOLLOWED
 from ..modes.modes import AssemblyModes, at_mode, modes
@@ -34,27 +35,24 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ModePair(Value):
+class ModePair(Value, all_told=True):
     """What is known of two modes, by their numbers: ``answer`` is that of ``path`` (None where nothing was asked),
     ``via`` the modes over which the verdict follows from those of other pairs."""
 
-    numbers: tuple[int, int]
+    numbers: Annotated[tuple[int, int], As("modes")]
     verdict: str
     certified: bool
     reason: str
     via: tuple[int, ...] = ()
-    answer: PathAnswer | None = None
+    answer: Annotated[PathAnswer | None, As("path"), "null where the verdict follows from others (`via`)"] = None
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line; ``path`` is null where the verdict follows from others."""
-        return {
-            "modes": list(self.numbers),
-            "verdict": self.verdict,
-            "certified": self.certified,
-            "reason": self.reason,
-            "via": list(self.via),
-            "path": None if self.answer is None else self.answer.to_dict(),
-        }
+
+class AspectsRecord(NamedTuple):
+    """The least and largest possible number of aspects of the modes, and which modes share one."""
+
+    least: int
+    most: int
+    modes: tuple[tuple[int, ...], ...]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -63,9 +61,9 @@ class Atlas(Result, shown_as="atlas"):
     the real robot's configurations at them (None if it was not found assembled)."""
 
     aspects: Aspects
-    listed: AssemblyModes
+    listed: Annotated[AssemblyModes, FLAT]
     places: tuple[ClosedConfiguration | None, ...]
-    pairs: tuple[ModePair, ...]
+    pairs: Annotated[tuple[ModePair, ...], ""]
 
     def headline(self) -> str:
         """The robot, how many modes, in how many aspects."""
@@ -80,6 +78,7 @@ class Atlas(Result, shown_as="atlas"):
         return {pair.numbers: pair for pair in self.pairs}
 
     @cached_property
+    @recorded()
     def table(self) -> list[list[str]]:
         """The verdicts, mode by mode."""
         numbers = range(1, len(self.places) + 1)
@@ -140,19 +139,14 @@ class Atlas(Result, shown_as="atlas"):
         )
 
     @property
+    @recorded()
     def cuspidal(self) -> bool | None:
         """Whether two modes lie in one aspect; None if that is not shown at this pose: it may be so at others."""
         return True if self.changes else None
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line, without the command's own fields."""
-        return {
-            **self.listed.to_dict(),
-            "table": self.table,
-            "pairs": [pair.to_dict() for pair in self.pairs],
-            "aspects": {"least": self.count[0], "most": self.count[1], "modes": [list(g) for g in self.groups]},
-            "cuspidal": self.cuspidal,
-        }
+    aspects_shared = Shown(
+        AspectsRecord, lambda self: AspectsRecord(self.count[0], self.count[1], self.groups), As("aspects")
+    )
 
 
 @question()

@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from ...budgets import SECTION_APART, SECTION_ITERATIONS, SECTION_PLACES, SECTION_STEP, SECTION_STEPS
 from ...geometry.balls import around, jets
 from ...geometry.vectors import Array
+from ...records import As, Record, Shown
 from ...tolerances import COMPLEX_STEP, FOLLOWED, SAME_SPOT, SOLVED
 from ..modes.polynomials import krawczyk
 from .three_cranks import ThreeCranks
@@ -36,40 +37,30 @@ Numbers = Sequence[Any] | NDArray[Any]
 
 
 @dataclass(frozen=True)
-class SectionPoint:
+class SectionPoint(Record, all_told=True):
     """A place of the surface: the turn of the first crank's w₀ in the plane, that of the platform since the goal, and
     the directions of e₁, e₂ (rad). ``radius``: of the box that is proved to hold exactly one such point (rad,
     characteristic lengths), for all geometries within ``tolerances.FOLLOWED``; None where it was found alone."""
 
     crank: float
-    turn: float
+    turn: Annotated[float, As("phi")]
     directions: tuple[float, float]
     radius: float | None
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {"crank": self.crank, "phi": self.turn, "directions": list(self.directions), "radius": self.radius}
-
 
 @dataclass(frozen=True, eq=False)
-class HeldLegSection:
+class HeldLegSection(Record):
     """The ``curve`` of Type 2 singularities as polylines (n, 4) of crank, turn and two directions (rad), its cusps and
     its nodes (two places each), as far as they were found."""
 
     robot: ThreeCranks
     held: complex
     curve: tuple[Array, ...]
-    cusps: tuple[SectionPoint, ...]
-    nodes: tuple[tuple[SectionPoint, SectionPoint], ...]
+    cusps: Annotated[tuple[SectionPoint, ...], ""]
+    nodes: Annotated[tuple[tuple[SectionPoint, SectionPoint], ...], ""]
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line, without the curve."""
-        return {
-            "held": self.robot.labels[0],
-            "directions": list(self.robot.labels[1:]),
-            "cusps": [cusp.to_dict() for cusp in self.cusps],
-            "nodes": [[place.to_dict() for place in node] for node in self.nodes],
-        }
+    told_held = Shown(str, lambda self: self.robot.labels[0], As("held"))
+    directions = Shown(list[str], lambda self: self.robot.labels[1:])
 
 
 def _times(a: Numbers, b: Numbers) -> Any:

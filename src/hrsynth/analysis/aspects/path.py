@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from itertools import combinations
-from typing import Any
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
@@ -16,8 +16,10 @@ from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.steps import lead_to, track
+from ...mechanism.observation import Observation
 from ...mechanism.pose import ModeNumber, Pose, PoseLike, asked_pose
 from ...progress import tell
+from ...records import As, Shown, recorded
 from ...results import Result, Value
 from ...tolerances import AS_PRINTED, RANK_CUTOFF, RANK_GAP, SOLVED
 from ..accuracy.cones import unseen
@@ -39,38 +41,30 @@ class PathEnd(Value):
     """A requested pose: the whole pose that is reached, the configuration in which it is, and the value of the
     condition there; at the goal of a path the value in the working modes in which the path ends."""
 
-    pose: Pose
+    pose: Annotated[Pose, ""]
     configuration: ClosedConfiguration
-    value: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {"pose": self.pose.to_dict(), "value": self.value}
+    value: Annotated[float, ""]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SampledRoad(Value):
+class SampledRoad(Value, all_told=True):
     """The condition at ``count`` poses on the straight path between two poses: the smallest |value|, and ``at`` which
     pose; how often its sign changes from one to the next (None for a value without sign); the part of the path that was
     ``reached``, and what was first seen not to be in front of its camera. Nothing is known between the poses."""
 
-    count: int
+    count: Annotated[int, As("poses")]
     least: float
     at: Pose
     changes: int | None
     reached: float
-    lost: str | None
+    lost: Annotated[str | None, As("lost_from_sight")]
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {
-            "poses": self.count,
-            "least": self.least,
-            "at": self.at.to_dict(),
-            "changes": self.changes,
-            "reached": self.reached,
-            "lost_from_sight": self.lost,
-        }
+
+class Crossing(NamedTuple):
+    """A leg that changes its working mode, and the pose of the path at which it does."""
+
+    leg: str
+    at: int
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -84,18 +78,18 @@ class PathAnswer(Result, shown_as="path"):
     """
 
     setting: ObservedRobot
-    verdict: str
-    certified: bool
-    poses: tuple[Pose, ...]
-    margin: float | None
-    boxes: int
-    start: PathEnd
-    goal: PathEnd
-    reason: str
+    verdict: Annotated[str, Literal["same aspect", "separated", "undecided"]]
+    certified: Annotated[bool, ""]
+    poses: Annotated[tuple[Pose, ...], As("path")]
+    margin: Annotated[float | None, ""]
+    boxes: Annotated[int, ""]
+    start: Annotated[PathEnd, ""]
+    goal: Annotated[PathEnd, ""]
+    reason: Annotated[str, ""]
     signed: bool
     coordinates: PathCoordinates | None = None
     ways: tuple[PathSegment, ...] = ()
-    limits: tuple[str, ...] = ()
+    limits: Annotated[tuple[str, ...], ""] = ()
     """Joints whose limits hold all along a certified path."""
     unlimited: tuple[str, ...] = ()
     """Joints whose limits are not considered."""
@@ -104,7 +98,7 @@ class PathAnswer(Result, shown_as="path"):
     goal_modes: tuple[tuple[float, ...], ...] = ()
     """Working modes of all limbs at the goal in which the sign is proved to be opposite to the start's, where they are
     separated."""
-    road: SampledRoad | None = None
+    road: Annotated[SampledRoad | None, As("sampled")] = None
     """The straight way, sampled; where neither a path nor a separation was enclosed."""
 
     def headline(self) -> str:
@@ -118,6 +112,7 @@ class PathAnswer(Result, shown_as="path"):
         return bool(np.max(np.abs(one - other)) <= AS_PRINTED)
 
     @property
+    @recorded(As("not_considered"))
     def not_proved(self) -> str:
         """What a certificate says nothing about."""
         joints = f"limits of joints {', '.join(self.unlimited)}; " if self.unlimited else ""
@@ -131,35 +126,22 @@ class PathAnswer(Result, shown_as="path"):
         return "" if all(o.by_segment for o in self.setting.observed) else "on which all that is observed has a value "
 
     @property
-    def crossings(self) -> tuple[tuple[str, int], ...]:
+    @recorded()
+    def crossings(self) -> tuple[Crossing, ...]:
         """The legs that change their working mode, each with the place of its limit in ``poses``."""
         found, place = [], 0
         for way in self.ways:
             if isinstance(way, WorkingModeChange):
-                found.append((way.leg, place + 1))
+                found.append(Crossing(way.leg, place + 1))
             place += len(_marks(way))
         return tuple(found)
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        point = None if self.coordinates is None else self.coordinates.motion.point.tolist()
-        return {
-            "observed": [o.to_dict() for o in self.setting.observed],
-            "verdict": self.verdict,
-            "certified": self.certified,
-            "path": [pose.to_dict() for pose in self.poses],
-            "crossings": [{"leg": leg, "at": place} for leg, place in self.crossings],
-            "point": point,
-            "margin": self.margin,
-            "boxes": self.boxes,
-            "value": "expression" if self.signed else "smallest singular value",
-            "start": self.start.to_dict(),
-            "goal": self.goal.to_dict(),
-            "reason": self.reason,
-            "limits": list(self.limits),
-            "not_considered": self.not_proved,
-            "sampled": self.road and self.road.to_dict(),
-        }
+    observed = Shown(tuple[Observation, ...], lambda self: self.setting.observed)
+    point = Shown(list[float] | None, lambda self: None if self.coordinates is None else self.coordinates.motion.point)
+    value = Shown(
+        Literal["expression", "smallest singular value"],
+        lambda self: "expression" if self.signed else "smallest singular value",
+    )
 
 
 def between(answer: PathAnswer, coordinates: PathCoordinates, ways: Sequence[PathSegment]) -> list[Pose]:

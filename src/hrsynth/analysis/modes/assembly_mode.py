@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from ...kinematics.limits import outside
 from ...kinematics.relation import Measurement, relation
 from ...kinematics.tasks import Held
 from ...mechanism.pose import Pose
+from ...records import FLAT, As, Number, Record, Shown
 from ...tolerances import CLOSED, SAME_RELATION
 from ..observed import ObservedRobot
 from ..singularity.agreement import weakest
@@ -24,8 +25,15 @@ from .sighted import behind, opposite, sights
 from .solve import SystemMode
 
 
+class LegMissed(NamedTuple):
+    """Why a leg of the real robot does not reach a mode, and by how much."""
+
+    leg: str
+    miss: Annotated[Miss, FLAT]
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class AssemblyMode:
+class AssemblyMode(Record):
     """A pose of the platform with the measurements of the goal.
 
     The exact pose, of the file's decimals, is within ``shift`` (m) and ``turn`` (rad) of ``pose``, infinite if nothing
@@ -38,37 +46,37 @@ class AssemblyMode:
     singular value of Mᵀ there, as ``check`` gives it; None if the robot was not closed, or if there is no Mᵀ.
     """
 
-    pose: Pose
+    pose: Annotated[Pose, ""]
     shift: float
     turn: float
-    residual: float
-    goal: bool
-    reachable: bool | None
-    type2_distance: float | None
-    assembly: str = NOT_FOUND
-    open: tuple[str, ...] = ()
-    beyond: tuple[str, ...] = ()
+    residual: Annotated[float, ""]
+    goal: Annotated[bool, ""]
+    reachable: Annotated[bool | None, ""]
+    type2_distance: Annotated[float | None, ""]
+    assembly: Annotated[str, Literal["yes", "beyond limits", "no", "not found"]] = NOT_FOUND
+    open: Annotated[tuple[str, ...], ""] = ()
+    beyond: Annotated[tuple[str, ...], ""] = ()
     misses: tuple[tuple[str, Miss], ...] = ()
     configuration: ClosedConfiguration | None = None
-    multiplicity: int = 1
-    proved: bool = False
+    multiplicity: Annotated[int, ""] = 1
+    proved: Annotated[bool, ""] = False
     """Whether there is exactly one mode within the radius, for all that the file's decimals and closed loops allow."""
-    rounded: bool = False
+    rounded: Annotated[bool, ""] = False
     """Whether that is proved for the rounded geometry alone, of which the radius then speaks."""
-    fits: float | None = None
+    fits: Annotated[float | None, "how well all legs fit if only some of them place it"] = None
     """How well all legs fit (characteristic lengths) where more is observed than needed and that is all that is known;
     the radius is then that of the mode, if it is one."""
-    enclosed: tuple[str, ...] = ()
+    enclosed: Annotated[tuple[str, ...], As("bodies")] = ()
     length: float = 1.0
     """The robot's characteristic length (m)."""
     bodies: dict[str, Array] | None = None
     """Poses (4, 4) of the bodies on which legs end, where need be of the controlled one; of a formation of all bodies,
     moved by a trivial motion to where they are nearest to the goal's."""
-    opposite: tuple[str, ...] = ()
+    opposite: Annotated[tuple[str, ...], ""] = ()
     """What is seen there as the opposite value: then it is *antipodal* and no mode."""
-    behind: tuple[str, ...] | None = None
+    behind: Annotated[tuple[str, ...] | None, ""] = None
     """What is not in front of the camera by which it is seen; None where no camera with a name sees a point."""
-    gears: tuple[str, ...] = ()
+    gears: Annotated[tuple[str, ...], As("open_couplings"), "couplings that were not closed where all legs were"] = ()
 
     def __repr__(self) -> str:
         said = "the pose itself" if self.goal else f"assembled: {self.assembly}"
@@ -84,31 +92,10 @@ class AssemblyMode:
         """The larger of the shift (characteristic lengths) and the turn (rad)."""
         return max(self.shift / self.length, self.turn)
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        known = bool(np.isfinite(self.radius))
-        return {
-            "pose": self.pose.to_dict(),
-            "radius": self.radius if known else None,
-            "radius_m": self.shift if known else None,
-            "radius_rad": self.turn if known else None,
-            "bodies": list(self.enclosed),
-            "residual": self.residual,
-            "goal": self.goal,
-            "reachable": self.reachable,
-            "assembly": self.assembly,
-            "open": list(self.open),
-            "open_couplings": list(self.gears),
-            "beyond": list(self.beyond),
-            "reasons": [{"leg": leg, **miss.to_dict()} for leg, miss in self.misses],
-            "type2_distance": self.type2_distance,
-            "multiplicity": self.multiplicity,
-            "proved": self.proved,
-            "rounded": self.rounded,
-            "fits": self.fits,
-            "opposite": list(self.opposite),
-            "behind": None if self.behind is None else list(self.behind),
-        }
+    told_radius = Shown(Number, lambda self: self.radius, As("radius"), "null if it is not known")
+    radius_m = Shown(Number, lambda self: self.shift if np.isfinite(self.radius) else None)
+    radius_rad = Shown(Number, lambda self: self.turn if np.isfinite(self.radius) else None)
+    reasons = Shown(list[LegMissed], lambda self: [LegMissed(*each) for each in self.misses])
 
 
 def found_mode(

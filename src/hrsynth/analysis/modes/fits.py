@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
@@ -161,10 +160,6 @@ class Meant:
     where: str
     legs: tuple[int, ...]
     defect: float
-
-    def to_dict(self, labels: tuple[str, ...]) -> dict[str, Any]:
-        """The record of the command line."""
-        return {"where": self.where, "legs": [labels[k] for k in self.legs], "defect_m": self.defect}
 
 
 def as_meant(system: System) -> tuple[System, tuple[Meant, ...]]:

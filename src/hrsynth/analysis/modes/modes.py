@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
@@ -17,13 +18,15 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.limits import outside
 from ...kinematics.relation import Measurement
 from ...kinematics.tasks import Task
+from ...mechanism.observation import Observation
 from ...mechanism.pose import ModeNumber, Pose, PoseLike, asked_pose
 from ...progress import tell
+from ...records import FLAT, OPTIONAL, As, Shown, recorded
 from ...results import Result
 from ...tolerances import MEASUREMENT_BOUND, SAME_NEAR_POSE
 from ..formation import Formation
 from ..measured import MeasuredRobot
-from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
+from ..observed import UNLIMITED, CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ..question import question
 from .assembly_mode import AssemblyMode, ModeReader, found_mode
 from .branches import Model
@@ -53,6 +56,40 @@ WITHIN = {
 """Among which poses the modes are listed, for each way in which the platform moves."""
 
 
+class BodyPlace(NamedTuple):
+    """Where a body of a formation is."""
+
+    link: str
+    pose: Pose
+
+
+class ListedMode(NamedTuple):
+    """An assembly mode."""
+
+    mode: Annotated[AssemblyMode, FLAT]
+    places: Annotated[
+        list[BodyPlace] | None,
+        list[BodyPlace],
+        OPTIONAL,
+        "of a formation: all bodies, moved by a trivial motion to where they are nearest to the file's",
+    ]
+
+
+class FollowedMotion(NamedTuple):
+    """A motion that leaves the measurements unchanged, as far as it was followed from a pose."""
+
+    pose: Pose
+    motion: Annotated[SelfMotion, FLAT]
+
+
+class MeantLegs(NamedTuple):
+    """Legs whose joint centres are taken to coincide."""
+
+    where: str
+    legs: list[str]
+    defect_m: float
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class AssemblyModes(Result, shown_as="modes"):
     """All assembly modes with the measurements of one pose, the goal.
@@ -63,21 +100,21 @@ class AssemblyModes(Result, shown_as="modes"):
     """
 
     setting: ObservedRobot
-    kind: str
+    kind: Annotated[str, Literal["hidden", "real", "formation"]]
     goal: ClosedConfiguration
     pose: Pose
     found: SystemModes
     modes: tuple[AssemblyMode, ...]
     candidates: tuple[AssemblyMode, ...] = ()
     """Where near modes are sought: working material, none once they are."""
-    near: tuple[NearMode, ...] = ()
+    near: Annotated[tuple[NearMode, ...], As("near_modes"), "found, not proved to be all"] = ()
     """Other poses at which what is measured differs by no more than ``bound`` (rad)."""
-    bound: float = 0.0
+    bound: Annotated[float, As("measurement_bound"), "error (rad) up to which near modes are sought"] = 0.0
     model: Model | None = None
     motions: tuple[SelfMotion, ...] = ()
     antipodal: tuple[AssemblyMode, ...] = ()
     """Solutions of the same equations at which something is seen as the opposite value."""
-    formation: Formation | None = None
+    formation: Annotated[Formation | None, Formation, OPTIONAL] = None
     """Of several bodies: what is not seen of them at the goal."""
 
     @property
@@ -86,6 +123,7 @@ class AssemblyModes(Result, shown_as="modes"):
         return None if self.model is None else self.model.confined
 
     @property
+    @recorded()
     def within(self) -> str | None:
         """The poses among which these modes are all."""
         if self.formation is not None:
@@ -144,37 +182,40 @@ class AssemblyModes(Result, shown_as="modes"):
         """A pose on a self-motion, from which it was followed."""
         return self.setting.motion.pose(motion.configuration.pose(self.setting.motion.link))
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line, without the command's own fields."""
-        found = self.found
-        return {
-            "kind": self.kind,
-            "at": self.pose.to_dict(),
-            "within": self.within,
-            "observed": [o.to_dict() for o in self.setting.observed],
-            "complex": None if found.continuum else found.complex,
-            "complete": found.complete,
-            "bound": found.bound,
-            "proof": found.proof,
-            **({} if self.formation is None else {"formation": self.formation.to_dict()}),
-            "modes": [self._record(each) for each in self.modes],
-            "near_modes": [each.to_dict() for each in self.near],
-            "measurement_bound": self.bound,
-            "antipodal": [self._record(each) for each in self.antipodal],
-            "degenerate": found.degenerate,
-            "continuum": found.continuum,
-            "motions": [{"pose": self.pose_of(each).to_dict(), **each.to_dict()} for each in self.motions],
-            "meant": [each.to_dict(self.labels) for each in found.meant],
-            "unlimited": list(self.setting.unlimited),
-        }
+    at = Shown(Pose, lambda self: self.pose)
+    observed = Shown(tuple[Observation, ...], lambda self: self.setting.observed)
+    complex = Shown(int | None, lambda self: None if self.found.continuum else self.found.complex)
+    complete = Shown(bool, lambda self: self.found.complete)
+    told_bound = Shown(str, lambda self: self.found.bound, As("bound"))
+    proof = Shown(str, lambda self: self.found.proof)
+    told_modes = Shown(list[ListedMode], lambda self: self._listed(self.modes), As("modes"))
+    told_antipodal = Shown(list[ListedMode], lambda self: self._listed(self.antipodal), As("antipodal"))
+    degenerate = Shown(str | None, lambda self: self.found.degenerate)
+    continuum = Shown(int | None, lambda self: self.found.continuum)
+    told_motions = Shown(
+        list[FollowedMotion],
+        lambda self: [FollowedMotion(self.pose_of(each), each) for each in self.motions],
+        As("motions"),
+    )
+    meant = Shown(
+        list[MeantLegs],
+        lambda self: [
+            MeantLegs(each.where, [self.labels[k] for k in each.legs], each.defect) for each in self.found.meant
+        ],
+    )
+    unlimited = Shown(list[str], lambda self: self.setting.unlimited, UNLIMITED)
 
-    def _record(self, mode: AssemblyMode) -> dict[str, Any]:
-        places = (
-            []
-            if self.formation is None
-            else [{"link": link, "pose": Pose.of(X).to_dict()} for link, X in (mode.bodies or {}).items()]
-        )
-        return {**mode.to_dict(), **({"places": places} if places else {})}
+    def _listed(self, modes: Iterable[AssemblyMode]) -> list[ListedMode]:
+        """Modes with where all bodies of a formation are."""
+        return [
+            ListedMode(
+                mode,
+                None
+                if self.formation is None or not mode.bodies
+                else [BodyPlace(link, Pose.of(X)) for link, X in mode.bodies.items()],
+            )
+            for mode in modes
+        ]
 
 
 @question(formations=True)

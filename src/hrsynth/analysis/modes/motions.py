@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import islice, takewhile
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from ...kinematics.limits import outside
 from ...kinematics.pinocchio_model import PinocchioModel
 from ...kinematics.relation import Measurement
 from ...kinematics.tasks import Held, shorten_step, solve, system
+from ...records import As, Record, Shown
 from ...tolerances import (
     CLOSED,
     INVERTED,
@@ -41,7 +42,7 @@ from ...tolerances import (
 
 
 @dataclass(frozen=True, eq=False)
-class SelfMotion:
+class SelfMotion(Record):
     """A motion of the robot with the measurements at rest, as far as it was followed from one of its poses.
 
     ``dimension``: in how many independent ways the platform's bodies were led to closings nearby; ``links``: those that
@@ -53,16 +54,16 @@ class SelfMotion:
     """
 
     configuration: ClosedConfiguration
-    dimension: int
-    links: tuple[str, ...]
-    shift: float
-    turn: float
-    returns: bool
-    goal: bool = False
-    met: int = 0
+    dimension: Annotated[int, ""]
+    links: Annotated[tuple[str, ...], ""]
+    shift: Annotated[float, As("followed_m")]
+    turn: Annotated[float, As("followed_rad")]
+    returns: Annotated[bool, ""]
+    goal: Annotated[bool, ""] = False
+    met: Annotated[int, ""] = 0
     way: tuple[dict[str, Array], ...] = field(default=(), repr=False)
     """The poses (4, 4) of the platform's bodies on the way."""
-    beyond: tuple[str, ...] = ()
+    beyond: Annotated[tuple[str, ...], "joints that are beyond their limits somewhere on the way"] = ()
     inside: tuple[float, float] = (0.0, 0.0)
 
     @cached_property
@@ -92,20 +93,12 @@ class SelfMotion:
         """Whether a closing where these links can move in so many ways may lie on it, beyond where it was followed."""
         return not (self.dimension == 1 and self.returns) and (self.dimension, self.links) == (dimension, tuple(links))
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {
-            "dimension": self.dimension,
-            "links": list(self.links),
-            "followed_m": self.shift,
-            "followed_rad": self.turn,
-            "returns": self.returns,
-            "goal": self.goal,
-            "met": self.met,
-            "beyond": list(self.beyond),
-            "within_m": self.inside[0] if self.beyond else self.shift,
-            "within_rad": self.inside[1] if self.beyond else self.turn,
-        }
+    within_m = Shown(
+        float,
+        lambda self: self.inside[0] if self.beyond else self.shift,
+        "how far the platform went with all joints within their limits",
+    )
+    within_rad = Shown(float, lambda self: self.inside[1] if self.beyond else self.turn)
 
 
 def _far(shift: float, turn: float) -> str:

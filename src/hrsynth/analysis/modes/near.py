@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.relation import Measurement, platform_motions, relation
 from ...kinematics.tasks import Held, shorten_step, solve
 from ...ranges import plain_number
+from ...records import As
 from ...results import Value
 from ...tolerances import CURVATURE_STEP, FAMILY_STEP, SAME_GEOMETRY, SAME_NEAR_POSE, SOLVED, SURELY_SOMETHING
 from ..accuracy.cones import single_angle
@@ -37,11 +38,11 @@ class NearMode(AssemblyMode):
     minimum there, which attracts the loop; None where the robot was not assembled. ``family``: it is one of a
     connected set of poses, no isolated minimum."""
 
-    angle: float = 0.0
-    distance: float = 0.0
-    turned: float = 0.0
-    stable: bool | None = None
-    family: bool = False
+    angle: Annotated[float, "largest difference of a measured value (rad; lengths in characteristic lengths)"] = 0.0
+    distance: Annotated[float, As("distance_m"), "from the goal"] = 0.0
+    turned: Annotated[float, As("turned_rad"), "from the goal"] = 0.0
+    stable: Annotated[bool | None, ""] = None
+    family: Annotated[bool, ""] = False
 
     @property
     def differs(self) -> str:
@@ -52,17 +53,6 @@ class NearMode(AssemblyMode):
             else (f"turned by {np.degrees(self.turned):.3g}°")
         )
         return f"by {degrees(self.angle)}, {far}"
-
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {
-            **super().to_dict(),
-            "angle": self.angle,
-            "distance_m": self.distance,
-            "turned_rad": self.turned,
-            "stable": self.stable,
-            "family": self.family,
-        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -63,17 +63,6 @@ class SystemMode(Value):
     near: bool = False
     """Whether it matches almost only."""
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain numbers."""
-        return {
-            "parameters": list(self.parameters),
-            "radius": self.radius,
-            "residual": self.residual,
-            "pose": self.pose.tolist(),
-            "multiplicity": self.multiplicity,
-            "fits": self.residual if self.fits else None,
-        }
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Solved(Value):
@@ -139,19 +128,6 @@ class SystemModes(Value):
 
     def __getstate__(self) -> dict[str, Any]:
         return {**super().__getstate__(), "solved": ()}
-
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line, without the command's own fields."""
-        return {
-            "complex": self.complex,
-            "complete": self.complete,
-            "bound": self.bound,
-            "proof": self.proof,
-            "modes": [each.to_dict() for each in self.modes],
-            "near": [each.to_dict() for each in self.near],
-            "degenerate": self.degenerate,
-            "continuum": self.continuum,
-        }
 
 
 def solve(system: System, *, near: bool = True, goal: Array | None = None) -> SystemModes:

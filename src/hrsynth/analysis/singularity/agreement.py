@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from ...kinematics.relation import Measurement, platform_motions, relation
 from ...kinematics.walking import WEAKEST, random_walk
 from ...mechanism.sights import CameraObservation
 from ...progress import tell
+from ...records import As, Number, Shown
 from ...results import Value
 from ...tolerances import CLOSED, FOLLOWED, INVERTED, NUDGE, RANK_CUTOFF, RANK_GAP, SAME_RELATION, SAME_SPOT
 from .batch_spectrum import SPOTS, Quick
@@ -44,29 +46,20 @@ class Agreement(Value):
     by Pinocchio's relation; ``disagreements`` counts poses at which one sees a singularity and another none.
     """
 
-    points: int
-    disagreements: int
-    largest_angle: float
-    smallest: float
+    points: Annotated[int, ""]
+    disagreements: Annotated[int, ""]
+    largest_angle: Annotated[float, ""]
+    smallest: Annotated[float, Number, As("smallest_singular_value")]
     """The smallest singular value of the relation met at the random poses."""
     sides: tuple[int, int]
     """Random poses with the expression positive and negative, where it has a sign."""
     on_locus: tuple[ClosedConfiguration, ...]
-    searches: int
+    searches: Annotated[int, ""]
     """Changes of sign and weak poses from which a pose on the locus was sought."""
 
-    def to_dict(self) -> dict[str, object]:
-        """The record of the command line."""
-        return {
-            "points": self.points,
-            "disagreements": self.disagreements,
-            "largest_angle": self.largest_angle,
-            "smallest_singular_value": self.smallest,
-            "positive": self.sides[0],
-            "negative": self.sides[1],
-            "on_locus": len(self.on_locus),
-            "searches": self.searches,
-        }
+    positive = Shown(int, lambda self: self.sides[0])
+    negative = Shown(int, lambda self: self.sides[1])
+    told_on_locus = Shown(int, lambda self: len(self.on_locus), As("on_locus"))
 
 
 def agreement(

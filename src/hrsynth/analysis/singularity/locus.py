@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations, product
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,13 +15,14 @@ from ...batch.reach import grid_dependence, reach, sweep
 from ...budgets import CLOSER, COARSE_GRID, LOCUS_SIDES
 from ...errors import BadRequest, PlaneNotMet, PoseNotReached
 from ...geometry.so3 import turn_about
-from ...geometry.vectors import Array, nested_lists
+from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.relation import Measurement
 from ...mechanism import Mechanism
 from ...mechanism.pose import Grid, Pose, as_pose
 from ...progress import tell
+from ...records import As, Number, Shown, recorded
 from ...results import Value
 from ...tolerances import ON_PLANE, SAME_RELATION, SAME_SPOT
 from ..measured import MeasuredRobot
@@ -44,12 +45,12 @@ class SingularityMap(Value):
     ``spots`` are singular poses (k, 2) that were found, and ``curve`` pieces (k, 2, 2) of the curve that was; ``never``
     where the condition cannot vanish, ``everywhere`` where it applies to all poses."""
 
-    value: Array
+    value: Annotated[Array, list[list[Number]], As("expression"), "null: not reached"]
     signed: bool
-    type2: Array
-    type1: Array
-    spots: Array
-    curve: Array
+    type2: Annotated[Array, list[list[Number]]]
+    type1: Annotated[Array, list[list[Number]]]
+    spots: Annotated[Array, list[list[float]], As("poses")]
+    curve: Annotated[Array, list[list[list[float]]]]
     never: bool
     everywhere: bool
 
@@ -59,33 +60,17 @@ class Locus(Value):
     """The fields of the hidden and, where it has motors that determine its platform, the real robot over a plane."""
 
     grid: Grid
-    hidden: SingularityMap
-    real: SingularityMap | None
+    hidden: Annotated[SingularityMap, ""]
+    real: Annotated[SingularityMap | None, ""]
 
     @property
+    @recorded()
     def reached(self) -> int:
         """How many of its poses the robot reaches."""
         return int(np.sum(np.isfinite(self.hidden.type2)))
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line: axes, what is fixed, and for each robot the tables (null: not reached)."""
-        robots = {"hidden": self.hidden, "real": self.real}
-        return {
-            "axes": {name: values.tolist() for name, values in self.grid.axes},
-            "fixed": self.grid.fixed.to_dict(),
-            "reached": self.reached,
-            **{
-                name: field
-                and {
-                    "expression": nested_lists(field.value),
-                    "type2": nested_lists(field.type2),
-                    "type1": nested_lists(field.type1),
-                    "poses": field.spots.tolist(),
-                    "curve": field.curve.tolist(),
-                }
-                for name, field in robots.items()
-            },
-        }
+    axes = Shown(dict[str, list[float]], lambda self: dict(self.grid.axes))
+    fixed = Shown(Pose, lambda self: self.grid.fixed)
 
 
 def locus(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Literal, NamedTuple
 
 from ...budgets import NEIGHBOUR_STEP
 from ...constraints.condition import Condition, always
@@ -16,13 +16,14 @@ from ...kinematics.relation import Measurement, platform_motions, relation
 from ...kinematics.tasks import solve
 from ...mechanism.pose import Pose
 from ...progress import tell
+from ...records import As, Shown, recorded
 from ...results import Result, Value
 from ...tolerances import SOLVED
 from ..freedoms import Freedom, name_freedoms
 from ..measured import MeasuredRobot
 from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ..question import question
-from ..verdict import Verdict
+from ..verdict import Verdict, Word
 from .agreement import Agreement, agreement, weakest
 
 POINTS = 10_000
@@ -36,19 +37,31 @@ class Example(Value):
     there, and the largest a centimetre away."""
 
     configuration: ClosedConfiguration
-    pose: Pose
-    lost: tuple[Freedom, ...]
-    sigma: float
-    nearby: float
+    pose: Annotated[Pose, ""]
+    lost: Annotated[tuple[Freedom, ...], ""]
+    sigma: Annotated[float, As("singular_value")]
+    nearby: Annotated[float, As("singular_value_nearby"), "a centimetre away"]
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {
-            "pose": self.pose.to_dict(),
-            "lost": [f.to_dict() for f in self.lost],
-            "singular_value": self.sigma,
-            "singular_value_nearby": self.nearby,
-        }
+
+class Measured(NamedTuple):
+    """What is measured, and of what."""
+
+    kind: Literal["directions", "observations", "motors"]
+    of: list[str]
+
+
+class Factor(NamedTuple):
+    """A factor of the expression, and what its vanishing means."""
+
+    expression: str
+    meaning: str
+
+
+class Unchecked(NamedTuple):
+    """Where a freedom is lost everywhere, there is no condition to compare."""
+
+    points: int
+    disagreements: int
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -63,16 +76,18 @@ class Singularity(Result, shown_as="singular"):
     pattern: ConstraintPattern
     condition: Condition | None
     """None where a freedom is lost everywhere."""
-    words: str
+    words: Annotated[str, ""]
     checked: Agreement | None
-    examples: tuple[Example, ...]
+    examples: Annotated[tuple[Example, ...], ""]
 
     @property
+    @recorded()
     def always(self) -> bool:
         """Whether a freedom is lost everywhere: partial controllability."""
         return self.condition is None
 
     @cached_property
+    @recorded()
     def unexamined(self) -> tuple[str, ...]:
         """Poses to which the condition does not apply, in words; none where it is computed at each pose anew."""
         return unexamined_poses(self.setting.anatomy, self.pattern, self.condition, self.setting.configurations)
@@ -81,34 +96,33 @@ class Singularity(Result, shown_as="singular"):
         """The robot and the condition in words."""
         return f"{self.setting.headline()}: {self.words}"
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        found = self.condition
+    @property
+    @recorded()
+    def measured(self) -> Measured:
+        """What is measured, and of what."""
         seen = self.question.observations
-        kind = "motors" if self.real else "directions" if all(o.by_segment for o in seen) else "observations"
-        checked = {"points": 0, "disagreements": 0} if self.checked is None else self.checked.to_dict()
-        return {
-            "measured": {
-                "kind": kind,
-                "of": [o.leg if kind == "observations" else getattr(o, "joint", o.link) for o in seen],
-            },
-            "dof": self.verdict.dof,
-            "verdict": self.verdict.verdict,
-            "lost": [freedom.to_dict() for freedom in self.verdict.lost],
-            "always": self.always,
-            "never": found is not None and found.never,
-            "unexamined": list(self.unexamined),
-            "words": self.words,
-            "expression": "0" if found is None else str(found.expression),
-            "where": {} if found is None else dict(found.where),
-            "factors": [] if found is None else list(found.factors),
-            "parts": []
-            if found is None
-            else [{"expression": str(part), "meaning": meaning} for part, meaning in found.parts],
-            "characteristic_length": self.setting.mechanism.length,
-            "checked": checked,
-            "examples": [each.to_dict() for each in self.examples],
-        }
+        if not self.real and not all(o.by_segment for o in seen):
+            return Measured("observations", [each.leg for each in seen])
+        return Measured("motors" if self.real else "directions", [getattr(o, "joint", o.link) for o in seen])
+
+    dof = Shown(int, lambda self: self.verdict.dof)
+    told_verdict = Shown(Word, lambda self: self.verdict.verdict, As("verdict"))
+    lost = Shown(tuple[Freedom, ...], lambda self: self.verdict.lost)
+    never = Shown(bool, lambda self: self.condition is not None and self.condition.never)
+    expression = Shown(str, lambda self: "0" if self.condition is None else str(self.condition.expression))
+    where = Shown(dict[str, str], lambda self: {} if self.condition is None else self.condition.where)
+    factors = Shown(list[str], lambda self: [] if self.condition is None else self.condition.factors)
+
+    @property
+    @recorded()
+    def parts(self) -> list[Factor]:
+        """The factors of the expression, and what it means that they vanish."""
+        return [] if self.condition is None else [Factor(str(part), meaning) for part, meaning in self.condition.parts]
+
+    characteristic_length = Shown(float, lambda self: self.setting.mechanism.length)
+    told_checked = Shown(
+        Agreement | Unchecked, lambda self: Unchecked(0, 0) if self.checked is None else self.checked, As("checked")
+    )
 
 
 @question()
