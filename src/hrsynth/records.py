@@ -26,6 +26,7 @@ from typing import (
     ClassVar,
     Literal,
     NotRequired,
+    TypedDict,
     TypeVar,
     Union,
     get_args,
@@ -43,6 +44,8 @@ SIMPLE: dict[Any, str] = {str: "string", int: "integer", float: "number", bool: 
 ANGLE = "the largest principal angle between two relations (rad)"
 GAP = "the smallest ratio of a singular value that counts to one that does not"
 """What is said of numbers that many records hold."""
+Word = Literal["controllable", "partially controllable", "uncontrollable", "nothing to control", "rigid", "flexible"]
+"""What can be said of what is seen of a robot, or of a formation."""
 MM, DEG = 1e3, degrees(1.0)
 """Scales of what is told in millimetres or degrees."""
 F = TypeVar("F", bound=Callable[..., Any])
@@ -115,6 +118,28 @@ def recorded(*extras: Any) -> Callable[[F], F]:
         return function
 
     return marked
+
+
+class Head(TypedDict):
+    """The fields with which every object of the command line begins."""
+
+    command: str
+    version: str
+
+
+class Platform(TypedDict):
+    """The link that is the platform (the first body of a formation); what chose it, and why."""
+
+    link: str
+    chosen: Literal["file", "option", "guess"]
+    reason: str
+
+
+class OfRobot(Head):
+    """The fields with which an answer about a robot begins."""
+
+    robot: str
+    platform: Platform
 
 
 def _told(value: Any) -> dict[str, Any]:

@@ -21,13 +21,13 @@ from ..mechanism.observations import kinds
 from ..mechanism.sensors import encoders, observation_of, observed_line
 from ..progress import tell
 from ..ranges import plain_number
-from ..records import FLAT, GAP, OPTIONAL, As, Shown, recorded
+from ..records import FLAT, GAP, OPTIONAL, As, Shown, Word, recorded
 from ..results import Result, Value
 from ..tolerances import RANK_CUTOFF, SAME_PRICE, SAME_RELATION
 from .freedoms import Freedom
 from .observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike, as_robot, as_texts, restrict_samples
 from .question import question
-from .verdict import AT_REST, CONTROLLABLE, Verdict, Word, verdict_of
+from .verdict import AT_REST, CONTROLLABLE, Verdict, verdict_of
 
 AXES = {JointType.UNIVERSAL: ("first", "second"), JointType.CYLINDRICAL: ("slide", "turn")}
 """The names of the coordinates of joints that have two."""

@@ -37,7 +37,7 @@ from ..mechanism.model import JointType
 from ..mechanism.observation import labels_of
 from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.relations import Relations, recognise
-from ..records import OPTIONAL, As, Record
+from ..records import OPTIONAL, As, Record, Word
 from ..results import Compared, finite
 from ..tolerances import CLOSED
 from .formation import PLACES, following, sense_links
@@ -46,7 +46,7 @@ from .instances import Instance, NotRecognised, draw, instance, kernel, random_n
 from .kept import are_kept, degree
 from .observed import ObservedRobot, select_relation
 from .sensor_rows import DEGREE, SensorPlaces, has_exact_rates
-from .verdict import Word, word
+from .verdict import word
 
 INSTANCES = 5
 """Random instances at which a deficient rank is confirmed."""

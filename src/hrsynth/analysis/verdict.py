@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, NamedTuple
 
 from ..errors import RankUndecided
 from ..geometry.ranks import Rank
 from ..kinematics.relation import Relation, look, relation
 from ..kinematics.sampling import Samples
-from ..records import GAP, OPTIONAL, Shown, recorded
+from ..records import GAP, OPTIONAL, Shown, Word, recorded
 from ..results import Result
 from ..tolerances import RANK_CUTOFF, RANK_GAP, SURELY_SOMETHING, SURELY_ZERO
 from .formation import Formation, formation_at
@@ -18,7 +18,6 @@ from .freedoms import Freedom, name_freedoms, point_text
 from .observed import ObservedRobot
 
 CONTROLLABLE, PARTIAL, BLIND = "controllable", "partially controllable", "uncontrollable"
-Word = Literal["controllable", "partially controllable", "uncontrollable", "nothing to control", "rigid", "flexible"]
 AT_REST = "nothing to control"
 """Of a platform that does not move, whatever its legs do."""
 ELSEWHERE = "with the platform at"

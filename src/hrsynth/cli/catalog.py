@@ -16,8 +16,9 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 
+from ..records import Head, Word
 from .colour import say
 from .commands import Group, add_command
 from .options import JSON, NEEDED, Option, flag, output, warn
@@ -75,6 +76,186 @@ FILTER = (
     Option("text", "Text that occurs in any field, or a name: Delta."),
 )
 """Which architectures are asked for."""
+
+
+class MotorChoiceRecord(TypedDict):
+    """A choice of motors of a published robot: the joints driven in each leg, from 1, and the freedoms they see."""
+
+    joints: list[list[int]]
+    rank: int
+
+
+class Entry(TypedDict, total=False):
+    """An architecture of the catalog; a refused one has only its word, group, notation and the reason."""
+
+    word: str
+    group: str
+    notation: str
+    refused: str
+    base_motors: bool
+    choices: list[MotorChoiceRecord]
+    condition: str
+    confirmed: int
+    cure: str
+    dof: int
+    driven: bool
+    exact: bool
+    fewest: int
+    hidden: str
+    idle: int
+    instances: int
+    legs: int
+    lost: list[str]
+    minimal: list[list[str]]
+    mobility: int
+    modes_bound: int
+    modes_legs: list[str]
+    modes_proof: str
+    modes_seen: int
+    motion: str
+    motor_rank: int
+    motors: int
+    rank: int
+    see: Annotated[str, "what is seen of the platform instead of legs"]
+    steps: list[str]
+    verdict: Word
+    attempt: int | None
+
+
+class CatalogList(Head):
+    """The architectures that fit, among all of these groups."""
+
+    total: int
+    groups: list[str]
+    entries: list[Entry]
+
+
+class SmallestSetRecord(TypedDict):
+    """A smallest set of legs and its hidden robot; what went wrong where none was derived."""
+
+    legs: list[str]
+    hidden: str | None
+    problem: str | None
+    near: Annotated[int | None, "near modes found, where the entry counts the modes of this set"]
+
+
+class CatalogShow(Head):
+    """One architecture, drawn and in full; `smallest` is empty where nothing is observed or no geometry is at hand."""
+
+    entry: Entry
+    drawing: list[str]
+    note: str | None
+    smallest: list[SmallestSetRecord]
+    file: str | None
+
+
+class BuiltGroup(TypedDict):
+    """A group: how many words it has, how many were made now and before; its file is null until it is complete."""
+
+    group: str
+    words: int
+    now: int
+    before: int
+    file: str | None
+
+
+class CatalogBuild(Head):
+    """What a build made, or with --check what is stale."""
+
+    groups: NotRequired[list[BuiltGroup]]
+    stale: NotRequired[list[str]]
+
+
+class Differing(TypedDict):
+    """A derivation that does not end in what the catalog says."""
+
+    word: str
+    derived: str
+
+
+class CatalogSite(Head):
+    """What a site holds, and where it starts."""
+
+    index: str
+    architectures: int
+    pages: int
+    now: int
+    differ: list[Differing]
+
+
+class AuditedKind(TypedDict):
+    """How often a kind of disagreement occurs that is settled in this way."""
+
+    kind: str
+    settled: str
+    number: int
+
+
+class AuditedSight(TypedDict):
+    """How many robots have this verdict, at generic dimensions with all legs watched, and need at least so many legs to
+    show as much as all."""
+
+    verdict: str
+    fewest: int
+    number: int
+
+
+class AuditedGroup(TypedDict):
+    """A group of published robots: how many were compared, and how many move as stated or further; how many of the
+    stated losses of rank, and of the stated numbers of working choices of motors, agree."""
+
+    group: str
+    robots: int
+    without_chain: int
+    moves_as_stated: int
+    moves_further: int
+    not_found: int
+    choices: int
+    choices_agree: int
+    choices_agree_in_stated: int
+    choices_not_stated: int
+    choices_not_compared: int
+    counts: int
+    counts_agree: int
+    watching: list[AuditedSight]
+    kinds: list[AuditedKind]
+
+
+class TableDisagreementRecord(TypedDict):
+    """A figure of a table that differs from what is computed, with its file and line, its kind and what settles it."""
+
+    robot: str
+    group: str
+    at: str
+    kind: str
+    theirs: str
+    ours: str
+    settled: str
+
+
+class NoLegChain(TypedDict):
+    """A robot whose leg chain is in no table."""
+
+    group: str
+    robot: str
+    chain: str
+
+
+class CatalogAudit(Head):
+    """Published tables compared: `rows` of them, `compared` ones, those that `agree` with everything that is stated;
+    `kinds` and `settlements` in words; `file` has the records with their instances modulo primes."""
+
+    folder: str
+    rows: int
+    compared: int
+    agree: int
+    groups: list[AuditedGroup]
+    kinds: dict[str, str]
+    settlements: dict[str, str]
+    disagreements: list[TableDisagreementRecord]
+    defects: list[str]
+    without_chain: list[NoLegChain]
+    file: str | None
 
 
 def _say(command: str, fields: dict[str, Any], text: str, json: bool) -> None:
@@ -526,5 +707,6 @@ EXAMPLES = {
     "site": ("-o pages --group planar",),
     "audit": ("tables --only 3T1R", "tables --sample 2000 -o audit.jsonl"),
 }
+RECORDS = {"build": CatalogBuild, "list": CatalogList, "show": CatalogShow, "site": CatalogSite, "audit": CatalogAudit}
 for name, words, run, options in COMMANDS:
-    add_command(catalog, name, words, options, run, EXAMPLES[name])
+    add_command(catalog, name, words, options, run, EXAMPLES[name], RECORDS[name])

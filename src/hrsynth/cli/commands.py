@@ -31,6 +31,8 @@ class DeclaredCommand:
     options: Sequence[Option]
     run: Callable[..., None]
     examples: Sequence[str] = ()
+    record: Any = None
+    """The type of what it prints with ``--json``, where that is no answer of a public function of its name."""
 
     @property
     def name(self) -> str:
@@ -182,9 +184,10 @@ def add_command(
     options: Sequence[Option],
     run: Callable[..., None],
     examples: Sequence[str] = (),
+    record: Any = None,
 ) -> None:
     """Add a command; the examples follow its name in its help."""
-    group.commands[name] = DeclaredCommand(f"{group.path} {name}", help, options, run, examples)
+    group.commands[name] = DeclaredCommand(f"{group.path} {name}", help, options, run, examples, record)
 
 
 def _examples(path: str, examples: Sequence[str]) -> list[str]:

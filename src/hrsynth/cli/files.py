@@ -2,13 +2,51 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NotRequired, TypedDict
 
+from ..records import Head, OfRobot, Platform
 from . import options
 from .colour import say
 from .commands import Group, add_command
 from .options import JSON, NEEDED, OUTPUT, SOURCE, Option, flag, output, robot_of, warn
 from .progress import Progress
+
+
+class ShippedRobot(TypedDict):
+    """A robot; for a shipped one also what it is, where it is described and with which dimensions."""
+
+    name: str
+    file: str
+    architecture_ascii: NotRequired[str]
+    dof: NotRequired[int]
+    section: NotRequired[str]
+    dimensions: NotRequired[str]
+
+
+class Robots(Head):
+    """The robots that come with the package."""
+
+    robots: list[ShippedRobot]
+
+
+class Convert(OfRobot):
+    """A robot that was written in another dialect, and what was lost."""
+
+    file: str
+    files: list[str]
+    links: int
+    joints: int
+    warnings: list[str]
+
+
+class Verify(Head):
+    """A certificate that was accepted, and what it proves."""
+
+    robot: NotRequired[str]
+    platform: NotRequired[Platform]
+    file: str
+    accepted: bool
+    proved: str
 
 
 def robots(examples: bool, json: bool) -> None:
@@ -118,6 +156,7 @@ def add(app: Group) -> None:
         ),
         verify,
         ("c.json", "c.json --robot quattro"),
+        Verify,
     )
     add_command(
         app,
@@ -126,6 +165,7 @@ def add(app: Group) -> None:
         (flag("examples", "The robots of the package example-robot-data instead: legged robots, arms, hands."), JSON),
         robots,
         ("", "--examples"),
+        Robots,
     )
     add_command(
         app,
@@ -153,4 +193,5 @@ def add(app: Group) -> None:
         ),
         convert,
         ("quattro quattro.xml", "leg.urdf -o robot.usda --meshes copy", "leg.urdf robot.yaml --to gepetto"),
+        Convert,
     )

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..characters import escape_steering
+from ..records import OfRobot
 from .colour import say
 from .commands import Group, add_command
 from .options import JSON, NEEDED, SOURCE, WATCHING, Option, flag, output, quiet_robot_of, robot_of, warn
@@ -22,6 +23,21 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 SHOWN = 20
 """Choices that are listed; others are named."""
+
+
+class Import(OfRobot):
+    """A robot that was read with answers or guesses and written, and the command that does the same without
+    questions."""
+
+    file: str
+    repeat: str
+    links: int
+    joints: int
+    base: str
+    motors: list[str]
+    observed: dict[str, str]
+    notes: list[str]
+    warnings: list[str]
 
 
 def importing(target: str, observe: str | None, yes: bool, view: bool, json: bool, **source: Any) -> None:
@@ -434,4 +450,5 @@ def add(app: Group) -> None:
         ),
         importing,
         ("leg.xml -o leg.urdf", "leg.urdf --close heel:toe:revolute --platform foot --yes -o own.urdf"),
+        Import,
     )

@@ -1,87 +1,68 @@
-"""The JSON schema of each command's record, made from its type in ``records.py``."""
+"""The JSON schema of each command's record, made of the type of its answer."""
 
 from __future__ import annotations
 
 import json as javascript
 import sys
 from collections.abc import Callable
-from typing import Any, Literal, TypedDict, is_typeddict
+from inspect import signature
+from typing import Any
 
 import hrsynth
 
 from .. import records
-from ..present.outputs import OUTPUTS
-from ..present.outputs import function as maker
-from ..records import object_schema
+from ..present.outputs import OUTPUTS, File, function
+from ..records import Head, OfRobot, object_schema
 from .colour import say
-from .commands import Group, add_command
+from .commands import DeclaredCommand, Group, add_command
 from .options import NEEDED, Option
 
+INTRODUCTION = """What every command prints with `--json`: one object. `hrsynth schema COMMAND` prints its JSON
+schema, and this page shows all of them. They are made of what each result says of its values.
+
+Lengths are metres and angles radians unless a name says otherwise (`_mm`, `_deg`). `null` stands for what is
+absent or not decided. Arrays over a grid are nested in the order of its `axes`.
+"""
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-
-
-class Head(TypedDict):
-    """The fields with which every object begins."""
-
-    command: str
-    version: str
-
-
-class Platform(TypedDict):
-    """The link that is the platform (the first body of a formation); what chose it, and why."""
-
-    link: str
-    chosen: Literal["file", "option", "guess"]
-    reason: str
-
-
-class OfRobot(Head):
-    """The fields with which an answer about a robot begins."""
-
-    robot: str
-    platform: Platform
 
 
 def schema(command: str) -> dict[str, Any]:
     """The schema of a command's record; raises ``KeyError`` for a command that has none."""
-    from .records import RECORDS
-
     parts: dict[str, Any] = {}
-    kind = RECORDS.get(command)
-    if is_typeddict(kind):
-        head, words = object_schema([kind], parts), kind.__doc__
+    kind = commands()[command].record
+    files: tuple[File, ...] = ()
+    if kind is not None:
+        head = object_schema([kind], parts)
     else:
-        function = getattr(hrsynth, command)
-        kind = _answer(function)
-        head, words = object_schema([OfRobot, kind], parts), kind.__doc__
-        for file in OUTPUTS[command].files:
-            if file.option is not None and file.field is not None:
-                head["properties"][file.field] = records.schema(str | None, parts)
-                head["required"] = sorted([*head["required"], file.field])
-            if file.record is not None and file.computed is not None:
-                head["properties"][file.record] = records.schema(_answer(maker(file.computed)) | None, parts)
-                head["required"] = sorted([*head["required"], file.record])
-    told = {"title": f"hrsynth {command} --json", "description": " ".join((words or "").split())}
+        kind, files = _answer(getattr(hrsynth, command)), OUTPUTS[command].files
+        of_robot = "robot" in signature(getattr(hrsynth, command)).parameters
+        head = object_schema([OfRobot if of_robot else Head, kind], parts)
+    fields = {file.field: str | None for file in files if file.option is not None and file.field is not None}
+    fields |= {file.record: _answer(function(file.computed)) | None for file in files if file.record and file.computed}
+    head["properties"] |= {name: records.schema(each, parts) for name, each in fields.items()}
+    head["required"] = sorted([*head["required"], *fields])
+    told = {"title": f"hrsynth {command} --json", "description": " ".join((kind.__doc__ or "").split())}
     return {"$schema": DIALECT, **told, **head, "$defs": parts}
 
 
-def _answer(function: Callable[..., Any]) -> Any:
+def commands() -> dict[str, DeclaredCommand]:
+    """The commands that print JSON, by what follows ``hrsynth``."""
+    from . import app
+
+    every: list[Any] = [*app.commands.values()]
+    leaves = [each for group in every for each in getattr(group, "commands", {"": group}).values()]
+    return {each.name: each for each in leaves if any(option.name == "json" for option in each.options)}
+
+
+def _answer(asked: Callable[..., Any]) -> Any:
     """The class of what a function answers."""
-    return vars(sys.modules[function.__module__])[function.__annotations__["return"]]
-
-
-def _commands() -> list[str]:
-    from .records import RECORDS
-
-    return [command for command in RECORDS if " " not in command]
+    return vars(sys.modules[asked.__module__])[asked.__annotations__["return"]]
 
 
 def page() -> str:
     """The page of all schemas, in Markdown."""
-    from .records import RECORDS
-
-    blocks = ["# The JSON of every command", sys.modules[RECORDS["check"].__module__].__doc__ or ""]
-    for command in RECORDS:
+    blocks = ["# The JSON of every command", INTRODUCTION]
+    for command in commands():
         lines = javascript.dumps(schema(command), ensure_ascii=False, indent=1).splitlines()
         inside = "\n".join(f"    {line}" for line in ("```json", *lines, "```"))
         blocks.append(f'??? abstract "{command}"\n\n{inside}')
@@ -94,16 +75,15 @@ def add(app: Group) -> None:
     def told(command: list[str]) -> None:
         """Print a command's schema."""
         from ..errors import BadRequest
-        from .records import RECORDS
 
         name = " ".join(command)
-        if name not in RECORDS:
+        if name not in commands():
             what = (
                 "this command prints no JSON"
                 if name in app.commands and not isinstance(app.commands[name], Group)
                 else "no record of the command"
             )
-            raise BadRequest(what, name, tuple(RECORDS))
+            raise BadRequest(what, name, tuple(commands()))
         say(javascript.dumps(schema(name), ensure_ascii=False, indent=2))
 
     add_command(
@@ -118,7 +98,7 @@ def add(app: Group) -> None:
                 list[str],
                 NEEDED,
                 argument=True,
-                words=_commands,
+                words=lambda: [each for each in commands() if " " not in each],
             ),
         ),
         told,

@@ -16,14 +16,14 @@ from ...kinematics.relation import Measurement, platform_motions, relation
 from ...kinematics.tasks import solve
 from ...mechanism.pose import Pose
 from ...progress import tell
-from ...records import As, Shown, recorded
+from ...records import As, Shown, Word, recorded
 from ...results import Result, Value
 from ...tolerances import SOLVED
 from ..freedoms import Freedom, name_freedoms
 from ..measured import MeasuredRobot
 from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ..question import question
-from ..verdict import Verdict, Word
+from ..verdict import Verdict
 from .agreement import Agreement, agreement, weakest
 
 POINTS = 10_000
