@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sqlite3
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
@@ -81,7 +81,7 @@ def _pattern(text: str) -> str | None:
 
 
 CONDITIONS: Mapping[str, Condition] = {
-    "group": Condition('"group" = {0}', _same),
+    "group": Condition('+"group" = {0}', _same),
     "dof": Condition("dof = {0}", _same),
     "motion": Condition("motion = {0}", _same),
     "verdict": Condition("verdict = {0}", _same),
@@ -94,8 +94,8 @@ CONDITIONS: Mapping[str, Condition] = {
     "modes": Condition("modes_bound = {0}", _same),
     "legs": Condition("legs = {0}", lambda number: _same(int(number))),
     "text": Condition(
-        "(instr(folded(word), {0}) OR said IN (SELECT said FROM texts WHERE instr(text, {0})))",
-        lambda text: folded(text),
+        "(said IN (SELECT said FROM texts WHERE instr(text, {0})) OR instr(lower(word), {0}))",
+        lambda text: _folded(text),
     ),
 }
 """What can be asked for."""
@@ -142,7 +142,6 @@ class Question:
 
     def rows(self, file: sqlite3.Connection) -> list[int]:
         """The numbers of the records that fit, in order."""
-        file.create_function("folded", 1, folded, deterministic=True)
         asked = f"SELECT record FROM records WHERE {self.where or 1} ORDER BY record"
         return [row for (row,) in file.execute(asked, self.values)]
 
@@ -174,7 +173,6 @@ def fill(
     """Make the tables of records, with these columns: the same bytes for the same lines. Raises what ``read`` raises
     for a line that is no record."""
     texts: dict[bytes, int] = {}
-    file.create_function("folded", 1, folded, deterministic=True)
     file.create_function("driven_kinds", 3, driven_kinds, deterministic=True)
     file.create_function("chains_of", 1, chains, deterministic=True)
     file.create_function("said", 1, lambda line: texts.setdefault(_said(read(line)), len(texts)))
@@ -220,15 +218,16 @@ def places(lines: Sequence[str], asked: Mapping[str, Any], read: Callable[[str],
         raise BadRequest("records of the catalog that cannot be searched", str(error)) from None
 
 
-def folded(text: str) -> bytes:
+def _folded(text: str) -> bytes:
     """A text as it is sought."""
     return text.casefold().encode("utf-8", "surrogatepass")
 
 
 def _said(found: Record) -> bytes:
-    """All texts of a record but its word, with the names under which its robot is known."""
-    values = [value for name, value in found.items() if name != "word"]
-    return BETWEEN.join(folded(str(each)) for each in (*values, known_as(found)))
+    """All texts of a record, with the names under which its robot is known; a word is sought apart, but for one with
+    letters of which SQLite knows no small ones."""
+    values = [value for name, value in found.items() if name != "word" or not value.isascii()]
+    return BETWEEN.join(_folded(str(each)) for each in (*values, known_as(found)))
 
 
 def driven_kinds(word: str, choices: str | None, dof: int) -> str:
