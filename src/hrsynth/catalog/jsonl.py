@@ -19,7 +19,7 @@ CHECKSUM = "crc32"
 _LINE_START, _GROUP = '{"word":"', '","group":"'
 
 FORMAT = 1
-"""Version of the lines, the journal and the tables."""
+"""Version of the lines and the journal."""
 
 TEXTS = (
     "word",
@@ -164,7 +164,7 @@ def word_of(text: str, file: str | None = None) -> str:
 
 
 def is_written(text: str) -> bool:
-    """Whether a line is as :func:`line` writes it, and what is asked for would stand in it letter by letter."""
+    """Whether a line is as :func:`line` writes it, and what it says stands in it letter by letter."""
     return text.startswith(_LINE_START) and _GROUP in text and '": ' not in text and "\\u" not in text
 
 
@@ -172,11 +172,6 @@ def leading_word(text: str, file: str | None = None) -> str:
     """The word with which a line begins that :func:`line` wrote, else that of its record."""
     end = text.find('"', len(_LINE_START)) if text.startswith(_LINE_START) else -1
     return text[len(_LINE_START) : end] if end > 0 else word_of(text, file)
-
-
-def written_text(text: str, name: str) -> str:
-    """The text of a field, without escaped letters, in a line that :func:`line` wrote; empty where there is none."""
-    return text.partition(f'"{name}":"')[2].partition('"')[0]
 
 
 def encode_lines(group: str, lines: Iterable[str], *, checksum: bool = True) -> bytes:
@@ -216,11 +211,11 @@ def decode_lines(content: bytes, file: str) -> list[str]:
     return rest.decode("ascii", "replace").split("\n")[:-1]
 
 
-def require_version(found: tuple[object, object], file: str) -> None:
-    """Raise ``BadRequest`` where a file is of another version of the format or of the catalog."""
-    if found != (FORMAT, VERSION):
+def require_version(found: tuple[object, object], file: str, wanted: int = FORMAT) -> None:
+    """Raise ``BadRequest`` where a file is of another version of the format than ``wanted`` or of the catalog."""
+    if found != (wanted, VERSION):
         raise BadRequest(
             f"{file}: a catalog of another version",
             "format {}, words {}".format(*found),
-            f"format {FORMAT}, words {VERSION}; build it again",
+            f"format {wanted}, words {VERSION}; build it again",
         )

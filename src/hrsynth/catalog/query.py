@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import difflib
+import json
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, overload
 
 from ..budgets import MOST_READ_PARTS
 from ..errors import BadRequest
 from ..results import Value
-from .fits import fits, require_askable
+from .conditions import places, require_askable
 from .jsonl import Record, leading_word, record
 from .known import alias, is_called, order
 from .store import DATABASES, ShippedCatalogs, Store, shipped_folder, store
@@ -30,6 +31,11 @@ class ReadRecords(Sequence[Record]):
 
     def __len__(self) -> int:
         return len(self._lines)
+
+    def fitting(self, asked: Mapping[str, Any]) -> ReadRecords:
+        """Those that fit what is asked for."""
+        found = places(self._lines, asked, partial(record, file=self._source))
+        return ReadRecords([self._lines[i] for i in found], self._source)
 
     def words(self) -> list[str]:
         """The words of all, none of which is read for that."""
@@ -94,7 +100,10 @@ class Catalog(Value):
         a name under which the robot is known. Several values in a tuple: any of them.
         """
         require_askable(asked)
-        return Catalog(tuple(filter(fits(asked), self.records)))
+        if isinstance(self.records, ReadRecords):
+            return Catalog(self.records.fitting(asked))
+        lines = [json.dumps(dict(each), separators=(",", ":"), default=str) for each in self.records]
+        return Catalog([self.records[i] for i in places(lines, asked, json.loads)])
 
     @property
     def words(self) -> list[str]:
@@ -130,8 +139,7 @@ def load(path: str | Path | None = None, **asked: Any) -> Catalog:
     require_askable(asked)
     kept = _there(path)
     groups = _groups(kept, asked)
-    found = Catalog(ReadRecords(kept.lines(groups, asked), str(kept.path)))
-    return found if kept.decides(asked) else found.where(**asked)
+    return Catalog(ReadRecords(kept.lines(groups, asked), str(kept.path)))
 
 
 def find_named(text: str, path: str | Path | None = None) -> list[Record]:

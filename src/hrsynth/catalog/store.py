@@ -5,35 +5,30 @@ from __future__ import annotations
 import contextlib
 import errno
 import gzip
-import json
 import re
 import sqlite3
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from importlib import resources
 from pathlib import Path
-from typing import Any, Protocol, overload
-
-import numpy as np
+from typing import Any, overload
 
 from ..budgets import LARGEST_CATALOG, LARGEST_RECORD, MOST_RECORDS
 from ..description.files import open_regular, replacement
 from ..errors import BadRequest, BuildStopped
 from ..untrusted import gunzip
-from .columns import Columns, ColumnWriter
-from .fits import ASKED, conditions, may_fit
+from .conditions import Question, fill, places
 from .journal import ENDING, Journal
-from .jsonl import FORMAT, decode_lines, encode_lines, head_count, leading_word, record, require_version
-from .search import Whole
+from .jsonl import FLAGS, decode_lines, encode_lines, head_count, leading_word, record, require_version
 from .words import VERSION
 
 DATABASES = (".sqlite", ".sqlite3", ".db")
 """Endings of a store that is one SQLite file."""
 LINES, PACKED = ".jsonl", ".jsonl.gz"
 """Endings of the files of a folder."""
-READ_AT_ONCE = 100
-"""Lines that are read from a SQLite file together."""
-PAGE = 16_384
-"""Bytes of a page of a SQLite file: columns of some megabytes are read in few."""
+TABLES = 2
+"""Version of the tables of a SQLite file."""
 PACKED_ABOVE = 5_000
 """Records of a group above which its file is compressed, where it may unpack to so much."""
 PUBLISHED = "published"
@@ -47,42 +42,43 @@ _PLAIN = re.compile(r"CREATE (TABLE|(\w+ )?INDEX)\b(?!.*\bAS\b)", re.IGNORECASE 
 """A table or an index whose columns are not computed, as a SQLite file has it."""
 
 
-class Store(Protocol):
+class Store(ABC):
     """Lines of records by group; written whole or not at all."""
 
-    path: Path
+    def __init__(self, path: Path) -> None:
+        self.path = path
 
+    @abstractmethod
     def groups(self) -> list[str]:
         """The groups that are stored, by name."""
 
+    @abstractmethod
     def lines(self, groups: Sequence[str], asked: Mapping[str, Any]) -> Sequence[str]:
-        """The lines of groups, sorted by word in each, without some that do not fit what is asked for
-        (:mod:`.fits`)."""
+        """The lines of groups whose records fit what is asked for (:mod:`.conditions`), sorted by word in each."""
 
-    def decides(self, asked: Mapping[str, Any]) -> bool:
-        """Whether these are all lines that fit, and no others."""
-
+    @abstractmethod
     def count(self, group: str) -> int:
         """How many lines a group has."""
 
+    @abstractmethod
     def values(self, name: str) -> list[Any]:
         """The values of a field that records have, one of ``FIELDS``, each once, sorted."""
 
+    @abstractmethod
     def write(self, group: str, lines: Iterable[str]) -> None:
         """Replace a group."""
 
+    @abstractmethod
     def journal(self, group: str, *, anew: bool = False) -> Journal:
         """The journal of a group's build, beside the store."""
 
+    @abstractmethod
     def file(self, group: str) -> Path:
         """The file that holds a group."""
 
 
-class Folder:
+class Folder(Store):
     """A folder with ``GROUP.jsonl`` for each group, or ``GROUP.jsonl.gz`` for a large one."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
 
     def groups(self) -> list[str]:
         return sorted(
@@ -94,9 +90,13 @@ class Folder:
         )
 
     def lines(self, groups: Sequence[str], asked: Mapping[str, Any]) -> list[str]:
-        fits = may_fit(asked)
-        every = (line for group in groups for line in decode_lines(self.content(group), str(self.file(group))))
-        return [line for line in _limited(every, self.path) if fits(line)]
+        found, size = list[str](), 0
+        for group in groups:
+            content = self.content(group)
+            size += len(content)
+            _require_small(size, self.path)
+            found += decode_lines(content, str(self.file(group)))
+        return [found[i] for i in places(found, asked, partial(record, file=str(self.path)))]
 
     def content(self, group: str) -> bytes:
         """The bytes of a group's lines; raises ``BadRequest`` where they cannot be read."""
@@ -112,14 +112,12 @@ class Folder:
             raise BadRequest(f"{file}: lines", count, f"up to {MOST_RECORDS}, or a file that is not compressed")
         return content
 
-    def decides(self, asked: Mapping[str, Any]) -> bool:
-        return all(value is None for value in asked.values())
-
     def count(self, group: str) -> int:
         return head_count(self.content(group).partition(b"\n")[0], str(self.file(group)))
 
     def values(self, name: str) -> list[Any]:
-        return _values(self.lines(self.groups(), {}), name)
+        records = (record(line, str(self.path)) for line in self.lines(self.groups(), {}))
+        return sorted({value for each in records if (value := each.get(name)) is not None})
 
     def write(self, group: str, lines: Iterable[str]) -> None:
         lines = list(lines)
@@ -162,53 +160,27 @@ class ShippedCatalogs(Folder):
         return Folder(self.path / PUBLISHED)
 
 
-class Database:
-    """One SQLite file with the same lines, and columns that tell which of them fit (:mod:`.columns`). Those of older
-    versions are read as a folder is."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
+class Database(Store):
+    """One SQLite file with the same lines, and tables that tell which of them fit (:mod:`.conditions`)."""
 
     def groups(self) -> list[str]:
-        with self._read() as file:
-            asked = "name FROM groups" if _is_new(file) else 'DISTINCT "group" FROM records'
-            found = [name for (name,) in file.execute(f"SELECT {asked} ORDER BY 1")]
-            if not all(isinstance(name, str) for name in found):
-                raise BadRequest(f"{self.path}: not a catalog file: a group without a name")
-            return found
+        found = self._column('SELECT DISTINCT "group" FROM records ORDER BY 1')
+        if not all(isinstance(name, str) for name in found):
+            raise BadRequest(f"{self.path}: not a catalog file: a group without a name")
+        return found
 
     def lines(self, groups: Sequence[str], asked: Mapping[str, Any]) -> Sequence[str]:
+        question = Question.of({**asked, "group": tuple(groups)})
         with _refusing_sqlite_errors(self.path):
             file = self._open()
-            if not _is_new(file):
-                fits = may_fit(asked)
-                every = (line for group in sorted(groups) for line in _old_lines(file, group))
-                return [line for line in _limited(every, self.path) if fits(line)]
-            counts = self._counts(file)
-            found = np.concatenate(
-                [np.full(count, name in groups) for name, count in counts.items()] or [np.zeros(0, bool)]
-            )
-            columns, told = Columns(self.path, file, found), conditions(asked)
-            for name in ASKED:  # patterns and texts last, of rows that are still there
-                if name in told and (rows := told[name].rows) and found.any():
-                    found &= rows(columns)
-            return StoredLines(self.path, file, np.flatnonzero(found))
-
-    def decides(self, asked: Mapping[str, Any]) -> bool:
-        with self._read() as file:
-            return all(each.rows and _is_new(file) for each in conditions(asked).values())
+            return StoredLines(self.path, file, question.rows(file))
 
     def count(self, group: str) -> int:
-        with self._read() as file:
-            if _is_new(file):
-                return self._counts(file).get(group, 0)
-            return int(file.execute('SELECT count(*) FROM records WHERE "group" = ?', (group,)).fetchone()[0])
+        return int(self._column('SELECT count(*) FROM records WHERE "group" = ?', group)[0])
 
     def values(self, name: str) -> list[Any]:
-        with self._read() as file:
-            if _is_new(file):
-                return Columns(self.path, file, np.zeros(0, bool)).values(name)
-        return _values(self.lines(self.groups(), {}), name)
+        found = self._column(f'SELECT DISTINCT "{name}" FROM records WHERE "{name}" IS NOT NULL ORDER BY 1')
+        return list(map(bool, found)) if name in FLAGS else found
 
     def write(self, group: str, lines: Iterable[str]) -> None:
         kept = (
@@ -216,7 +188,7 @@ class Database:
         )
         with writable(self.path), replacement(self.path, sync=True) as draft:
             try:
-                _write_tables(draft, {**kept, group: lines})
+                write_tables(draft, {**kept, group: lines})
             except sqlite3.Error as error:
                 raise BuildStopped(f"{self.path}: {error}") from None
 
@@ -228,25 +200,10 @@ class Database:
     def file(self, group: str) -> Path:
         return self.path
 
-    def _counts(self, file: sqlite3.Connection) -> dict[str, int]:
-        """How many lines each group has; raises ``BadRequest`` where there are not as many, numbered from 0."""
-        counts = dict(file.execute("SELECT name, count FROM groups ORDER BY name"))
-        count, first, last = file.execute(
-            "SELECT count(*), ifnull(min(record), 0), ifnull(max(record), -1) FROM lines"
-        ).fetchone()
-        if not all(type(each) is int and each > 0 for each in counts.values()) or (
-            sum(counts.values()),
-            0,
-            last + 1,
-        ) != (count, first, count):
-            raise BadRequest(f"{self.path}: not a catalog file: its groups and its lines differ in number")
-        return counts
-
-    @contextlib.contextmanager
-    def _read(self) -> Iterator[sqlite3.Connection]:
-        """The file to read; raises ``BadRequest`` for something else, or another version."""
+    def _column(self, asked: str, *values: object) -> list[Any]:
+        """What is found in one column; raises ``BadRequest`` for something else than a catalog, or another version."""
         with _refusing_sqlite_errors(self.path), contextlib.closing(self._open()) as file:
-            yield file
+            return [value for (value,) in file.execute(asked, values)]
 
     def _open(self) -> sqlite3.Connection:
         """The file to read, where it holds no more than tables: views and triggers are programs."""
@@ -260,19 +217,20 @@ class Database:
         for name, made in file.execute("SELECT name, sql FROM sqlite_master WHERE sql IS NOT NULL"):
             if not _PLAIN.match(str(made)):
                 raise BadRequest(f"{self.path}: not a catalog file: it holds", name, "plain tables")
-        require_version(file.execute("SELECT format, catalog FROM versions").fetchone() or (None, None), str(self.path))
+        found = file.execute("SELECT format, catalog FROM versions").fetchone() or (None, None)
+        require_version(found, str(self.path), TABLES)
         return file
 
 
 class StoredLines(Sequence[str]):
-    """Lines of a SQLite file, by the numbers of their rows; they are read, some at a time, when they are looked at."""
+    """Lines of a SQLite file, by the numbers of their rows; each is read when it is looked at."""
 
-    def __init__(self, path: Path, file: sqlite3.Connection, numbers: Whole) -> None:
-        self._path, self._file, self._numbers, self._read = path, file, numbers, dict[int, list[str]]()
+    def __init__(self, path: Path, file: sqlite3.Connection, rows: Sequence[int]) -> None:
+        self._path, self._file, self._rows, self._read = path, file, rows, dict[int, str]()
         self._size = 0
 
     def __len__(self) -> int:
-        return len(self._numbers)
+        return len(self._rows)
 
     @overload
     def __getitem__(self, place: int) -> str: ...
@@ -283,52 +241,22 @@ class StoredLines(Sequence[str]):
     def __getitem__(self, place: int | slice) -> str | Sequence[str]:
         if isinstance(place, slice):
             return [self[i] for i in range(*place.indices(len(self)))]
-        part, offset = divmod(range(len(self))[place], READ_AT_ONCE)
-        if part not in self._read:
-            wanted = self._numbers[part * READ_AT_ONCE : (part + 1) * READ_AT_ONCE].tolist()
+        row = self._rows[place]
+        if row not in self._read:
             with _refusing_sqlite_errors(self._path):
-                found = dict(
-                    self._file.execute(
-                        "SELECT record, line FROM lines WHERE record IN (SELECT value FROM json_each(?))",
-                        (json.dumps(wanted),),
-                    )
-                )
-            if not all(isinstance(found.get(number), str) for number in wanted):
+                (line,) = self._file.execute("SELECT line FROM lines WHERE record = ?", (row,)).fetchone() or (None,)
+            if not isinstance(line, str):
                 raise BadRequest(f"{self._path}: not a catalog file: rows without a line")
-            self._read[part] = list(_limited((found[number] for number in wanted), self._path, self._size))
-            self._size += sum(map(len, self._read[part]))
-        return self._read[part][offset]
+            self._size += len(line)
+            _require_small(self._size, self._path)
+            self._read[row] = line
+        return self._read[row]
 
 
-def _limited(lines: Iterable[str], file: Path, size: int = 0) -> Iterator[str]:
-    """Lines; raises ``BadRequest`` where they are larger, with what was read before, than may be read."""
-    for line in lines:
-        size += len(line)
-        if size > LARGEST_CATALOG:
-            raise BadRequest(f"{file}: lines of more than {LARGEST_CATALOG} bytes", None, "a smaller catalog")
-        yield line
-
-
-def _is_new(file: sqlite3.Connection) -> bool:
-    """Whether there are columns; files of older versions have only lines that can be used."""
-    return file.execute("SELECT 1 FROM sqlite_master WHERE name = 'columns'").fetchone() is not None
-
-
-def _old_lines(file: sqlite3.Connection, group: str) -> Iterator[str]:
-    """The lines of a group in a file of an older version: in the table of records, or in one of their own."""
-    apart = file.execute("SELECT 1 FROM sqlite_master WHERE name = 'lines'").fetchone()
-    where = "records JOIN lines ON record = records.rowid" if apart else "records"
-    return (
-        line
-        for (line,) in file.execute(
-            f"""SELECT ifnull(CAST(line AS TEXT), '') FROM {where} WHERE "group" = ? ORDER BY word""", (group,)
-        )
-    )
-
-
-def _values(lines: Iterable[str], name: str) -> list[Any]:
-    """The values of a field in lines, each once, sorted."""
-    return sorted({value for each in lines if (value := record(each).get(name)) is not None})
+def _require_small(size: int, file: Path) -> None:
+    """Raise ``BadRequest`` for lines that are larger together than may be read."""
+    if size > LARGEST_CATALOG:
+        raise BadRequest(f"{file}: lines of more than {LARGEST_CATALOG} bytes", None, "a smaller catalog")
 
 
 def store(path: str | Path) -> Store:
@@ -384,23 +312,16 @@ def writable(file: Path, what: str = "catalog") -> Iterator[None]:
         raise BadRequest(f"cannot write the {what}: {error.strerror}", str(file)) from None
 
 
-def _write_tables(path: Path, groups: Mapping[str, Iterable[str]]) -> None:
+def write_tables(path: Path, groups: Mapping[str, Iterable[str]]) -> None:
     """Write a new file: the same bytes for the same lines."""
+    lines = [line for _, group in sorted(groups.items()) for line in sorted(group, key=leading_word)]
     with contextlib.closing(sqlite3.connect(path)) as file:
         file.execute("PRAGMA journal_mode = OFF")
-        file.execute(f"PRAGMA page_size = {PAGE}")
+        file.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_RECORD)
         file.execute("CREATE TABLE versions (format INTEGER, catalog INTEGER)")
-        file.execute("INSERT INTO versions VALUES (?, ?)", (FORMAT, VERSION))
-        file.execute("CREATE TABLE groups (name TEXT PRIMARY KEY, count INTEGER) WITHOUT ROWID")
+        file.execute("INSERT INTO versions VALUES (?, ?)", (TABLES, VERSION))
+        fill(file, lines)
+        file.execute('CREATE INDEX by_group ON records ("group")')
         file.execute("CREATE TABLE lines (record INTEGER PRIMARY KEY, line TEXT)")
-        columns, number = ColumnWriter(), 0
-        for group, lines in sorted(groups.items()):
-            first = number
-            for line in sorted(lines, key=leading_word):
-                columns.add(record(line))
-                file.execute("INSERT INTO lines VALUES (?, ?)", (number, line))
-                number += 1
-            if number > first:
-                file.execute("INSERT INTO groups VALUES (?, ?)", (group, number - first))
-        columns.write(file)
+        file.executemany("INSERT INTO lines (line) VALUES (?)", zip(lines, strict=True))
         file.commit()

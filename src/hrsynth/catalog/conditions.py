@@ -1,0 +1,261 @@
+"""What records are asked for, as SQL: each condition stands here once, for a SQLite file and for lines in memory."""
+
+from __future__ import annotations
+
+import json
+import re
+import sqlite3
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from typing import Any
+
+from ..budgets import LARGEST_RECORD
+from ..errors import BadRequest
+from .jsonl import Record, is_written, leading_word, record
+from .known import kinds, kinds_called, known_as
+from .words import LONGEST_COUNT, MOVED, count_equal, sights
+
+FIELDS = (
+    "word",
+    "group",
+    "notation",
+    "legs",
+    "dof",
+    "motion",
+    "verdict",
+    "base_motors",
+    "driven",
+    "fewest",
+    "see",
+    "modes_bound",
+)
+"""Fields of a record that have a column of their own."""
+COLUMNS: Mapping[str, str] = {
+    **{name: f"json_extract(line, '$.{name}')" for name in FIELDS},
+    "drives": """iif(json_type(line, '$.refused') IS NULL, driven_kinds(json_extract(line, '$.word'),
+        json_extract(line, '$.choices'), json_extract(line, '$.dof')), NULL)""",
+    "parallelograms": """iif(json_type(line, '$.refused') IS NULL,
+        max(instr(json_extract(line, '$.word'), 'Pi'), instr(json_extract(line, '$.word'), '2SS'),
+            instr(json_extract(line, '$.word'), '2US')) > 0, NULL)""",
+    "said": "said(line)",
+}
+"""The columns of the table of records, and how each comes from a record's line. ``drives``: the kinds of driven joints;
+``parallelograms``: whether a leg has one, or two equal parallel rods; ``said``: the number of its text in the table of
+texts."""
+BETWEEN = b"\xff"
+"""Between texts: no text that is asked for has it."""
+LONGEST_PATTERN = 50_000
+"""Bytes of a pattern, above which SQLite takes none."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What is asked for by one name."""
+
+    where: str
+    """In SQL, ``{0}`` for the value."""
+    read: Callable[[Any], Any]
+    """The value as SQL is told it: None for one that none has. Raises ``BadRequest`` for one that none can have."""
+
+
+def _same(value: Any) -> Any:
+    """A value that a field may have."""
+    if isinstance(value, str):
+        return None if re.search("[\ud800-\udfff]", value) else value
+    fits = isinstance(value, float) or (isinstance(value, int) and abs(value) < 2**63)
+    return value if fits else None
+
+
+def _letters(text: str) -> str:
+    letters = sorted(set(text.split("+")))
+    if not set(letters) <= set(MOVED):
+        raise BadRequest("the catalog cannot be asked for motors", text, f"{', '.join(MOVED)}, or several joined by +")
+    return "+".join(letters)
+
+
+def _pattern(text: str) -> str | None:
+    """A pattern of ``*`` and ``?``, in which brackets stand for themselves."""
+    found = _same(re.sub(r"\*+", "*", text).replace("[", "[[]"))
+    return None if found is None or "\0" in found or len(found.encode()) > LONGEST_PATTERN else found
+
+
+CONDITIONS: Mapping[str, Condition] = {
+    "group": Condition('+"group" = {0}', _same),
+    "dof": Condition("dof = {0}", _same),
+    "motion": Condition("motion = {0}", _same),
+    "verdict": Condition("verdict = {0}", _same),
+    "base_motors": Condition("base_motors = {0}", _same),
+    "driven": Condition("driven = {0}", _same),
+    "motors": Condition("drives = {0}", _letters),
+    "parallelograms": Condition("parallelograms = {0}", _same),
+    "fewest": Condition("fewest = {0}", _same),
+    "see": Condition("see = {0}", lambda text: _same(count_equal(sights(text)))),
+    "modes": Condition("modes_bound = {0}", _same),
+    "legs": Condition("legs = {0}", lambda number: _same(int(number))),
+    "text": Condition(
+        "(said IN (SELECT said FROM texts WHERE instr(text, {0})) OR instr(lower(word), {0}))",
+        lambda text: _folded(text),
+    ),
+}
+"""What can be asked for."""
+LEG_PATTERN = Condition(
+    """(word GLOB {0} OR replace(word, '*', '') GLOB {0}
+        OR notation IN (SELECT notation FROM chains WHERE chain GLOB {0}))""",
+    _pattern,
+)
+"""The same for ``legs``, where that is no number."""
+
+
+def require_askable(asked: Mapping[str, Any]) -> None:
+    """Raise ``BadRequest`` for a name that cannot be asked for."""
+    for name in asked:
+        if name not in CONDITIONS:
+            raise BadRequest("the catalog cannot be asked for", name, tuple(CONDITIONS))
+
+
+@dataclass(frozen=True)
+class Question:
+    """All that is asked for and not None, as SQL with its values."""
+
+    where: str
+    values: Sequence[Any]
+
+    @classmethod
+    def of(cls, asked: Mapping[str, Any]) -> Question:
+        """Of several values in a tuple or list one has to be met. Raises ``BadRequest`` for a value that none can
+        have."""
+        clauses, values = list[str](), list[Any]()
+        for name, value in asked.items():
+            terms = []
+            for each in value if isinstance(value, tuple | list) else () if value is None else (value,):
+                condition, told = _condition(name, each.item() if hasattr(each, "item") else each)
+                values.append(told)
+                terms.append(condition.where.format(f"?{len(values)}"))
+            if value is not None:
+                clauses.append(_any_of(terms))
+        return cls(" AND ".join(clauses), values)
+
+    def columns(self) -> list[str]:
+        """The columns that are looked at."""
+        return [name for name in COLUMNS if re.search(rf"\b{name}\b", self.where)]
+
+    def rows(self, file: sqlite3.Connection) -> list[int]:
+        """The numbers of the records that fit, in order."""
+        asked = f"SELECT record FROM records WHERE {self.where or 1} ORDER BY record"
+        return [row for (row,) in file.execute(asked, self.values)]
+
+
+def _condition(name: str, value: Any) -> tuple[Condition, Any]:
+    """That of one value, and the value as it is told."""
+    of_texts = name in ("legs", "see", "text", "motors")
+    if of_texts and not isinstance(value, str) and (name, type(value)) != ("legs", int):
+        raise BadRequest(f"the catalog cannot be asked for {name}", value, "a text, or a number of legs")
+    counted = name != "legs" or isinstance(value, int) or (value.isdecimal() and len(value) <= LONGEST_COUNT)
+    condition = CONDITIONS[name] if counted else LEG_PATTERN
+    return condition, condition.read(value)
+
+
+def _any_of(terms: Sequence[str]) -> str:
+    """One of these; SQLite takes no deep nesting."""
+    if len(terms) < 3:
+        return f"({' OR '.join(terms or ['word IS 0'])})"
+    half = len(terms) // 2
+    return f"({_any_of(terms[:half])} OR {_any_of(terms[half:])})"
+
+
+def fill(
+    file: sqlite3.Connection,
+    lines: Sequence[str],
+    columns: Sequence[str] = tuple(COLUMNS),
+    read: Callable[[str], Record] = record,
+) -> None:
+    """Make the tables of records, with these columns: the same bytes for the same lines. Raises what ``read`` raises
+    for a line that is no record."""
+    texts: dict[bytes, int] = {}
+    file.create_function("driven_kinds", 3, driven_kinds, deterministic=True)
+    file.create_function("chains_of", 1, chains, deterministic=True)
+    file.create_function("said", 1, lambda line: texts.setdefault(_said(read(line)), len(texts)))
+    names = ", ".join(f'"{name}"' for name in columns)
+    told = ", ".join(COLUMNS[name] for name in columns)
+    file.execute(f"CREATE TABLE records (record INTEGER PRIMARY KEY, {names})")
+    file.execute("CREATE TABLE texts (said INTEGER PRIMARY KEY, text)")
+    file.execute("CREATE TABLE chains (notation, chain)")
+    try:
+        file.executemany(
+            f"INSERT INTO records ({names}) SELECT {told} FROM (SELECT ? AS line)", zip(lines, strict=True)
+        )
+    except sqlite3.Error:
+        for line in lines:
+            read(line)
+        raise
+    file.executemany("INSERT INTO texts VALUES (?, ?)", ((number, text) for text, number in texts.items()))
+    if "notation" in columns:
+        file.execute(
+            """INSERT INTO chains SELECT notation, value FROM (SELECT DISTINCT notation FROM records ORDER BY 1),
+            json_each(chains_of(notation))"""
+        )
+
+
+def places(lines: Sequence[str], asked: Mapping[str, Any], read: Callable[[str], Record]) -> Sequence[int]:
+    """Where among lines those of records are that fit. Not all are read; raises what ``read`` raises for those that
+    are no records, where that is seen without reading."""
+    question = Question.of(asked)
+    rest: Sequence[int] = range(len(lines))
+    if not question.where:
+        return rest
+    for line in lines:
+        if not is_written(line):
+            read(line)
+    if isinstance(text := asked.get("text"), str):
+        rest = [i for i in rest if _may_hold(lines[i], text.casefold())]
+    try:
+        with closing(sqlite3.connect(":memory:")) as memory:
+            memory.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_RECORD)
+            fill(memory, [lines[i] for i in rest], question.columns(), read)
+            return [rest[row - 1] for row in question.rows(memory)]
+    except sqlite3.Error as error:
+        raise BadRequest("records of the catalog that cannot be searched", str(error)) from None
+
+
+def _folded(text: str) -> bytes:
+    """A text as it is sought."""
+    return text.casefold().encode("utf-8", "surrogatepass")
+
+
+def _said(found: Record) -> bytes:
+    """All texts of a record, with the names under which its robot is known; a word is sought apart, but for one with
+    letters of which SQLite knows no small ones."""
+    values = [value for name, value in found.items() if name != "word" or not value.isascii()]
+    return BETWEEN.join(_folded(str(each)) for each in (*values, known_as(found)))
+
+
+def driven_kinds(word: str, choices: str | None, dof: int) -> str:
+    """The kinds of driven joints ("R", "P+R"), as a word marks them; of a published robot those of the first choice of
+    motors that determines all freedoms, or else of the first."""
+    listed = json.loads(choices or "[]")
+    if not listed:
+        return "+".join(sorted(set(re.findall(r"([RPCU])[a-z]*\*", word))))
+    chosen = next((each for each in listed if each["rank"] == dof), listed[0])
+    chain = re.match(r"P[0-9]+?([RP]+)", word)
+    letters = chain[1] if chain else ""
+    return "+".join(sorted({letters[j - 1] for leg in chosen["joints"] for j in leg if 0 < j <= len(letters)}))
+
+
+def chains(notation: str | None) -> str:
+    """The names by which legs are found beside the word, as a list of JSON: notation and each leg's chain, with and
+    without the marks of motors."""
+    text = notation or ""
+    found = {text, *(re.sub(r"^[0-9]+-", "", term) for term in re.split(r"\+(?![^{]*})", text))}
+    return json.dumps(sorted({name for each in found if each for name in (each, each.replace("*", ""))}))
+
+
+def _may_hold(line: str, text: str) -> bool:
+    """Whether the record of a line may hold a casefolded text, or be known by it, without reading it: where the line
+    is as a build writes it, and the text would stand in it letter by letter."""
+    return (
+        text in line.casefold()
+        or not re.fullmatch(r"[a-z0-9*+!.{|}()-]+( +[a-z0-9*+!.{|}()-]+)*", text)
+        or not is_written(line)
+        or kinds(leading_word(line)) in kinds_called(text)
+    )
