@@ -12,12 +12,14 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "docs"))
+
 from generated import generated
 from measure import Row
 from others import catalog, derivations, jacobians, modes, platforms
 from sweeps import exact_maxima, growth, matrices, other_twists
 
-from hrsynth.present.markdown import replace_between, table
+from tables.markdown import replace_between, table
 
 START = "<!-- generated: benchmarks -->"
 

@@ -24,7 +24,8 @@ PAGES = sorted((ROOT / "docs" / "pages").glob("*.md"))
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.name)
 def test_what_a_page_names_is_there(page: Path):
     """Paths of the project in code style."""
-    named = re.findall(r"`((?:src|docs|tests|notebooks|robots|catalog)/[\w/.]*)`", page.read_text(encoding="utf-8"))
+    text = page.read_text(encoding="utf-8")
+    named = re.findall(r"`((?:src|docs|tests|notebooks|robots|catalog|studies)/[\w/.]*)`", text)
     assert [name for name in named if not (ROOT / name).exists()] == []
 
 

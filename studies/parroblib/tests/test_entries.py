@@ -8,11 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from catalog.published import write
-from hrsynth.catalog.audit.study import StudyCase, study
-from hrsynth.catalog.audit.tables import read
-from hrsynth.catalog.published import _sets, published_words
 from hrsynth.cli import execute
+from parroblib import says
+from parroblib.__main__ import main
+from parroblib.entries import _sets, published_words
+from parroblib.study import StudyCase, study
+from parroblib.tables import read
+from parroblib.tests.small_tables import write
 
 
 @pytest.fixture(scope="module")
@@ -49,30 +51,38 @@ def test_sets_are_all_but_for_turns_of_the_robot(tables: Path):
             assert len(list(_sets(robot, size))) == sum(fixed) / len(turns)
 
 
+def test_the_tables_of_the_page_are_those_of_the_catalog() -> None:
+    assert says.PAGE.read_text(encoding="utf-8") == says.page(), "the page is stale: make readme"
+
+
 @pytest.mark.slow
 def test_the_command_line(tables: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     kept, robot = tmp_path / "published.sqlite", tmp_path / "robot.urdf"
-    assert execute(["catalog", "build", "2T1R", "--tables", str(tables), "-o", str(kept)]) == 0
-    assert execute(["catalog", "build", "--check", "2T1R", "--tables", str(tables), "-o", str(kept)]) == 0
+    assert main(["build", str(tables), "2T1R", "-o", str(kept)]) == 0
+    assert main(["build", str(tables), "2T1R", "-o", str(kept), "--check"]) == 0
     capsys.readouterr()
     assert execute(["catalog", "list", "--catalog", str(kept), "--verdict", "controllable", "--json"]) == 0
     (entry,) = json.loads(capsys.readouterr().out)["entries"]
     assert (entry["word"], entry["hidden"], entry["group"]) == ("P3RRR1G1P1", "3-PiR*R", "2T1R")
-    for more in (["--catalog", str(kept)], ["--tables", str(tables), "-o", str(robot)]):
-        assert execute(["catalog", "show", "P3RRR1G1P1", *more]) == 0
-        out = capsys.readouterr().out
-        assert "choices       joint 1 of each leg: 3" in out
-        assert "watched link" not in out
+    assert execute(["catalog", "show", "P3RRR1G1P1", "--catalog", str(kept)]) == 0
+    out = capsys.readouterr().out
+    assert "choices       joint 1 of each leg: 3" in out
+    assert "watched link" not in out
+    assert main(["robot", str(tables), "P3RRR1G1P1", "-o", str(robot)]) == 0
     assert execute(["derive", str(robot), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["verdict"] == "controllable"
     for arguments, said in (
-        (["show", "P3RRR1G1P1", "--catalog", str(kept), "-o", str(robot)], "--tables FOLDER"),
-        (["show", "P9", "--tables", str(tables)], "not a robot of these tables"),
-        (["site", "--catalog", str(kept), "-o", str(tmp_path / "site")], "no pages are made"),
-        (["build", "--tables", str(tables)], "-o FOLDER"),
-        (["build", "--tables", str(tmp_path), "-o", str(kept)], "no table of robots"),
-        (["build", "planar", "--tables", str(tables), "-o", str(kept)], "unknown group"),
+        (["robot", str(tables), "P9", "-o", str(robot)], "not a robot of these tables"),
+        (["build", str(tmp_path), "-o", str(kept)], "no table of robots"),
+        (["build", str(tables), "planar", "-o", str(kept)], "unknown group"),
     ):
-        assert execute(["catalog", *arguments]) == 2
+        assert main(arguments) == 2
+        assert said in (err := capsys.readouterr().err)
+        assert err.count("\n") == 1
+    for command, said in (
+        (["show", "P3RRR1G1P1", "--catalog", str(kept), "-o", str(robot)], "parroblib robot"),
+        (["site", "--catalog", str(kept), "-o", str(tmp_path / "site")], "no pages are made"),
+    ):
+        assert execute(["catalog", *command]) == 2
         assert said in (err := capsys.readouterr().err)
         assert err.count("\n") == 1

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ...budgets import AUDIT_DRAWS
+from .limits import DRAWS
 from .motions import RZ, TURN, TX, LegFactor, dimensions, factors
 from .prime_field import PRIMES, Matrix, NotExact, PrimeField, Turn
 from .study import axes_of
@@ -195,7 +195,7 @@ class _Instance(PrimeField):
         whole = self._turns(parts, leg, shared)
         numbers: list[int] = whole[1::2]  # type: ignore[assignment]
         between: list[Matrix] = whole[::2]  # type: ignore[assignment]
-        for _ in range(AUDIT_DRAWS):
+        for _ in range(DRAWS):
             joints = {j: self.any_turn() for j in numbers}
             if target is not None:
                 chosen = self._choose(numbers, between)

@@ -1,4 +1,4 @@
-"""Small tables of symmetric robots in the form that `catalog audit` reads, written for the tests."""
+"""Small tables of symmetric robots in the form that the study reads, written for the tests."""
 
 from __future__ import annotations
 

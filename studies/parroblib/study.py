@@ -15,13 +15,14 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from ...budgets import AUDIT_BATCH, AUDIT_POSES, AUDIT_TRIALS
-from ...geometry.ranks import CLEAN
-from ...geometry.so3 import exponential, logarithm
-from ...geometry.vectors import Array
-from ...tolerances import AUDIT_CHANGED, AUDIT_SLIGHT, AUDIT_TURNED, RANK_GAP
+from hrsynth.geometry.ranks import CLEAN
+from hrsynth.geometry.so3 import exponential, logarithm
+from hrsynth.geometry.vectors import Array
+from hrsynth.tolerances import RANK_GAP
+
 from .closing import BatchState, RobotBatch, batch, close, legs_at
 from .freedoms import PlatformFreedoms, freedoms, freedoms_left, within
+from .limits import BATCH, CHANGED, POSES, SLIGHT, TRIALS, TURNED
 from .motions import LegFactor, dimensions, factors
 from .tables import ANGLES, Held, PublishedRobot
 from .watching import WatchedLegs, watching
@@ -101,8 +102,8 @@ def study(cases: Sequence[StudyCase], seed: int) -> Iterator[tuple[StudyCase, St
     for case in cases:
         alike.setdefault((case.robot.legs, len(case.robot.chain.joints), case.robot.motion), []).append(case)
     for (legs, joints, _), some in alike.items():
-        for k in range(0, len(some), AUDIT_BATCH):
-            part = some[k : k + AUDIT_BATCH]
+        for k in range(0, len(some), BATCH):
+            part = some[k : k + BATCH]
             yield from zip(part, _batch(part, np.random.default_rng([seed, legs, joints, k])), strict=True)
 
 
@@ -110,11 +111,9 @@ def _batch(cases: Sequence[StudyCase], random: np.random.Generator) -> list[Stud
     found: list[Studied | None] = [None] * len(cases)
     others: list[set[tuple[int, int]]] = [set() for _ in cases]
     sparse = axes_of(cases[0].robot).sum() < 3
-    for trial in range(AUDIT_TRIALS * (1 + sparse)):
-        related = trial >= AUDIT_TRIALS
-        todo = [
-            i for i, each in enumerate(found) if each is None or (each.finite is not None and trial < AUDIT_TRIALS // 2)
-        ]
+    for trial in range(TRIALS * (1 + sparse)):
+        related = trial >= TRIALS
+        todo = [i for i, each in enumerate(found) if each is None or (each.finite is not None and trial < TRIALS // 2)]
         if not todo:
             break
         letters = [cases[i].letters_of(trial) for i in todo]
@@ -132,7 +131,7 @@ def _trial(
     """One random start of each robot: what it does, None where it does not close or move as stated."""
     parts = [factors(robot, each) for robot, each in zip(robots, letters, strict=True)]
     of, axes, wanted = batch(parts, len(robots[0].chain.joints)), axes_of(robots[0]), sum(robots[0].motion)
-    poses = AUDIT_POSES if related else 1
+    poses = POSES if related else 1
     state, closed = _close_at_random(of, len(robots), robots[0].legs, axes, poses, random)
     closed &= _plain(parts, state)
     again, persists = _close_elsewhere(of, state, robots[0].legs, axes, random, keep=related)
@@ -209,7 +208,7 @@ def _plain(parts: Sequence[Sequence[LegFactor]], state: BatchState) -> NDArray[n
         for k, name in enumerate(dimensions(part)):
             value = state.lengths[b, k]
             size = np.sin(2 * value) if name.startswith(FREE_ANGLES) else value
-            good[b] &= name.startswith(COUPLED) or bool(abs(size) > AUDIT_SLIGHT)
+            good[b] &= name.startswith(COUPLED) or bool(abs(size) > SLIGHT)
     return good
 
 
@@ -219,11 +218,11 @@ def _close_elsewhere(
     """Closed again in the stated motion, elsewhere, and (unless ``keep``) with other dimensions."""
     at = _first(state, n)
     B = len(at.q)
-    lengths = at.lengths * (1 + (0.0 if keep else AUDIT_CHANGED) * random.standard_normal(at.lengths.shape))
+    lengths = at.lengths * (1 + (0.0 if keep else CHANGED) * random.standard_normal(at.lengths.shape))
     start = BatchState(
         lengths,
-        at.q + AUDIT_CHANGED * random.standard_normal(at.q.shape),
-        at.p + AUDIT_CHANGED * random.standard_normal(at.p.shape),
+        at.q + CHANGED * random.standard_normal(at.q.shape),
+        at.p + CHANGED * random.standard_normal(at.p.shape),
         at.R,
     )
     return close(of, start, np.broadcast_to(axes, (B, 1, 3)), np.ones((B, 1, 3)), sized=False)
@@ -239,14 +238,14 @@ def _can_leave(
         return np.zeros(B, dtype=bool)
     some = np.arange(6) < now.dof[:, None]
     V = np.einsum("bij,bj->bi", now.twists, some * random.standard_normal((B, 6)))
-    V *= 3 * AUDIT_CHANGED / np.maximum(np.linalg.norm(V, axis=1), AUDIT_CHANGED)[:, None]
+    V *= 3 * CHANGED / np.maximum(np.linalg.norm(V, axis=1), CHANGED)[:, None]
     legs = legs_at(of, at)
     rates = np.einsum("bnij,bj->bni", np.linalg.pinv(np.swapaxes(legs, -1, -2), rcond=1e-9), V)
     start = BatchState(at.lengths, at.q + rates, at.p + V[:, None, :3], exponential(V[:, 3:])[:, None] @ at.R)
     end, done = close(of, start, np.ones((B, 1, 3)), np.ones((B, 1, 3)), sized=False)
     turn = logarithm(end.R[:, 0] @ np.swapaxes(at.R[:, 0], -1, -2))
     off = np.linalg.norm(turn * (1 - axes), axis=1)
-    return np.asarray(done & (off > AUDIT_TURNED) & (freedoms(legs_at(of, end)).dof == now.dof))
+    return np.asarray(done & (off > TURNED) & (freedoms(legs_at(of, end)).dof == now.dof))
 
 
 def _every(robots: Sequence[PublishedRobot]) -> list[Held]:

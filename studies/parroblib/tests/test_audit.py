@@ -12,19 +12,19 @@ import numpy as np
 import pytest
 
 import hrsynth
-from catalog.published import write
-from hrsynth.catalog.audit.closing import BatchState, batch, close, forward
-from hrsynth.catalog.audit.exact import by_legs, exact
-from hrsynth.catalog.audit.freedoms import freedoms, freedoms_left
-from hrsynth.catalog.audit.motions import dimensions, factors
-from hrsynth.catalog.audit.prime_field import NotExact
-from hrsynth.catalog.audit.run import audit
-from hrsynth.catalog.audit.study import StudyCase, motor_choices, study
-from hrsynth.catalog.audit.tables import PublishedRobot, cell, read
-from hrsynth.cli import execute
 from hrsynth.errors import BadRequest
+from parroblib.__main__ import main
+from parroblib.closing import BatchState, batch, close, forward
+from parroblib.exact import by_legs, exact
+from parroblib.freedoms import freedoms, freedoms_left
+from parroblib.motions import dimensions, factors
+from parroblib.prime_field import NotExact
+from parroblib.run import audit
+from parroblib.study import StudyCase, motor_choices, study
+from parroblib.tables import PublishedRobot, cell, read
+from parroblib.tests.small_tables import write
 
-REAL = Path(os.environ.get("HRSYNTH_PUBLISHED", Path(__file__).resolve().parents[3] / "shared" / "parroblib"))
+REAL = Path(os.environ.get("HRSYNTH_PUBLISHED", Path(__file__).resolve().parents[4] / "shared" / "parroblib"))
 """Where the published tables may lie; tests that need them are skipped without."""
 
 
@@ -391,17 +391,17 @@ def test_a_broken_audit_goes_on_with_the_same_bytes(tables: Path, tmp_path: Path
 
 
 def test_the_command_line(tables: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
-    assert execute(["catalog", "audit", str(tables), "--only", "2T1R", "--json"]) == 0
+    assert main(["audit", str(tables), "--only", "2T1R", "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
-    assert (data["command"], data["rows"], data["agree"]) == ("catalog audit", 2, 1)
-    assert execute(["catalog", "audit", str(tables), "--sample", "1"]) == 0
+    assert (data["rows"], data["agree"]) == (2, 1)
+    assert main(["audit", str(tables), "--sample", "1"]) == 0
     assert "rows compared" in capsys.readouterr().out
     broken = write(tmp_path / "broken")
     with (broken / "robots" / "sym_2T1R_list.csv").open("a") as file:
         file.write("\nP3XYZ;S3RRR1\n")
-    assert execute(["catalog", "audit", str(broken), "--only", "2T1R"]) == 0
+    assert main(["audit", str(broken), "--only", "2T1R"]) == 0
     out, err = capsys.readouterr()
-    assert re.search(r"^hrsynth: .*sym_2T1R_list.csv:\d+: not the name of a robot, found P3XYZ", err, re.MULTILINE)
+    assert re.search(r"^parroblib: .*sym_2T1R_list.csv:\d+: not the name of a robot, found P3XYZ", err, re.MULTILINE)
     assert out.splitlines()[-3].startswith("left out: 1 line of the tables, ")
     for arguments, said in (
         ([str(tmp_path / "none")], "no folder of tables"),
@@ -409,7 +409,7 @@ def test_the_command_line(tables: Path, tmp_path: Path, capsys: pytest.CaptureFi
         ([str(tables), "--only", "4T"], "no group of these tables"),
         ([str(tables), "-o", "x.csv"], "one per line"),
     ):
-        assert execute(["catalog", "audit", *arguments]) == 2
+        assert main(["audit", *arguments]) == 2
         assert said in capsys.readouterr().err
 
 

@@ -16,7 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...geometry.vectors import Array
+from hrsynth.geometry.vectors import Array
+
 from .tables import BASE_PAIRS, PLATFORM_PAIRS, PublishedRobot
 
 RX, RY, RZ, TX, TY, TZ, TURN = range(7)

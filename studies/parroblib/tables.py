@@ -14,8 +14,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
-from ...budgets import LARGEST_CELL
-from ...errors import BadRequest, Defect, shorten_text
+from hrsynth.errors import BadRequest, Defect, shorten_text
+
+from .limits import LARGEST_CELL
 
 CHAIN = re.compile(r"S(\d)([PR]+)(\d{1,9}(?:V\d{1,9})?)$", re.ASCII)
 ROBOT = re.compile(r"P([1-9])([PR]+)(\d{1,9}(?:V\d{1,9})?)G(\d{1,9})P(\d{1,9})$", re.ASCII)

@@ -8,13 +8,14 @@ from functools import cache
 
 import numpy as np
 
-from ..analysis.accuracy.accuracy import accuracy
-from ..description import load, shipped
-from ..families.replays import REPLAYS, Replay
-from ..mechanism.pose import Pose
-from ..simulation.result import Servo
-from ..simulation.servo import servo
+from hrsynth.analysis.accuracy.accuracy import accuracy
+from hrsynth.description import load, shipped
+from hrsynth.mechanism.pose import Pose
+from hrsynth.simulation.result import Servo
+from hrsynth.simulation.servo import servo
+
 from .markdown import table as markdown
+from .printed_runs import REPLAYS, Replay
 
 START = "<!-- generated: replays -->"
 HEADS = (

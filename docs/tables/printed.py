@@ -6,12 +6,13 @@ import math
 from collections.abc import Iterator
 from functools import cache
 
-from ..analysis.derive import derive
-from ..analysis.modes.assembly_mode import AssemblyMode
-from ..analysis.modes.modes import AssemblyModes, modes
-from ..description import load, shipped
-from ..families.printed import CLAIMS, FORMS, Place, PrintedClaim, PrintedForm
+from hrsynth.analysis.derive import derive
+from hrsynth.analysis.modes.assembly_mode import AssemblyMode
+from hrsynth.analysis.modes.modes import AssemblyModes, modes
+from hrsynth.description import load, shipped
+
 from .markdown import table as markdown
+from .printed_claims import CLAIMS, FORMS, Place, PrintedClaim, PrintedForm
 
 START = "<!-- generated: printed modes -->"
 HEADS = ("source", "robot", "legs", "printed x, y, z (φ = 0)", "computed x, y, z; φ", "apart", "word")

@@ -1,37 +1,22 @@
-"""What the catalog says, as tables and as rules that need no computation; ``python docs/catalog_says.py`` writes the
-tables between the marks of docs/pages/catalog_says.md, and those of published robots on docs/pages/audit.md."""
+"""What the catalog says, as tables and as rules that need no computation, on the page docs/pages/catalog_says.md."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from hrsynth.analysis.verdict import BLIND, CONTROLLABLE, PARTIAL
-from hrsynth.catalog.audit.tables import ROBOT
 from hrsynth.catalog.groups.spatial import translates
-from hrsynth.catalog.query import Catalog, load
+from hrsynth.catalog.query import Catalog
 from hrsynth.catalog.words import LegWord, RobotWord, parse
-from hrsynth.present.markdown import replace_between, table
 
-PAGE = Path(__file__).resolve().parent / "pages" / "catalog_says.md"
-AUDIT = PAGE.with_name("audit.md")
+from .markdown import replace_between, table
+
+PAGE = Path(__file__).resolve().parents[1] / "pages" / "catalog_says.md"
 VERDICTS = (CONTROLLABLE, PARTIAL, BLIND)
-BASES = (
-    "z up",
-    "tangential",
-    "radial",
-    "on a cone",
-    "z up, in pairs",
-    "tangential, in pairs",
-    "radial, in pairs",
-    "on a cone, in pairs",
-    "all along one line of the base's plane",
-    "all normal to the base's plane",
-)
-"""Couplings to the base, from G1 on, by where the axes of the legs' first joints lie."""
 INFINITY, RAIL, GENERAL = "line at infinity", "line across the rails", "line in general position"
 Record = Mapping[str, Any]
 
@@ -125,7 +110,7 @@ def motions(catalog: Catalog) -> str:
     for each in studied(catalog):
         by.setdefault(each["motion"], Counter())[each["verdict"]] += 1
     rows = [
-        (motion, f"{sum(found.values()):,}", *(f"{found[v]:,}" for v in VERDICTS), _share(found))
+        (motion, f"{sum(found.values()):,}", *(f"{found[v]:,}" for v in VERDICTS), share(found))
         for motion, found in sorted(by.items(), key=lambda item: -sum(item[1].values()))
     ]
     return table(("motion", "architectures", *VERDICTS, "controllable (%)"), rows, 1)
@@ -159,7 +144,7 @@ def chains(catalog: Catalog) -> str:
         if len(letters) == 1:
             by.setdefault((each["group"], *letters), Counter())[each["verdict"]] += 1
     rows = [
-        (group, f"`{chain}`", *(f"{found[v]:,}" if found[v] else "–" for v in VERDICTS), _share(found))
+        (group, f"`{chain}`", *(f"{found[v]:,}" if found[v] else "–" for v in VERDICTS), share(found))
         for (group, chain), found in sorted(by.items())
     ]
     return table(("group", "legs", *VERDICTS, "controllable (%)"), rows, 1)
@@ -214,58 +199,7 @@ def rules(catalog: Catalog) -> str:
     return table(("rule", "agree"), rows, 1)
 
 
-def published(catalog: Catalog) -> str:
-    """Verdicts of published robots by the motion that their tables state, and how many of them are not exact."""
-    rows = []
-    for (group,) in catalog.count("group"):
-        every = list(catalog.where(group=group))
-        found = studied(Catalog(tuple(every)))
-        legs = Counter(each["fewest"] for each in found if each["verdict"] == CONTROLLABLE)
-        rows.append(
-            (
-                group,
-                f"{len(every):,}",
-                *(f"{sum(each['verdict'] == v for each in found):,}" for v in VERDICTS),
-                f"{len(every) - len(found):,}",
-                f"{sum(not each['exact'] for each in found):,}",
-                ", ".join(f"{n}: {count:,}" for n, count in sorted(legs.items())),
-                f"{sum('modes_bound' in each for each in found):,}",
-            )
-        )
-    return table(
-        (
-            "group",
-            "robots",
-            *VERDICTS,
-            "refused",
-            "not exact",
-            "legs to watch: controllable robots",
-            "with a list of modes",
-        ),
-        rows,
-        1,
-    )
-
-
-def couplings(catalog: Catalog) -> str:
-    """Verdicts of published robots that move in all ways, by how the first joints of their legs lie on the base."""
-    counts: dict[int, Counter[str]] = {}
-    for each in studied(catalog.where(group="3T3R")):
-        if match := ROBOT.match(each["word"]):
-            counts.setdefault(int(match[4]), Counter())[each["verdict"]] += 1
-    rows = [
-        (BASES[number - 1], f"{sum(found.values()):,}", *(f"{found[v]:,}" for v in VERDICTS), _share(found))
-        for number, found in sorted(counts.items())
-    ]
-    return table(("first joints", "robots", *VERDICTS, "% controllable"), rows, 1)
-
-
 TABLES = {"motions": motions, "fewest": fewest, "chains": chains, "cures": cures, "rules": rules}
-PAGES: Sequence[tuple[Path, str | None, Mapping[str, Callable[[Catalog], str]]]] = (
-    (PAGE, None, TABLES),
-    (AUDIT, "published", {"published": published, "couplings": couplings}),
-)
-"""Each page, the catalog of its tables, and what makes them."""
 
 
 def start(name: str) -> str:
@@ -280,10 +214,6 @@ def written(text: str, catalog: Catalog, tables: Mapping[str, Callable[[Catalog]
     return text
 
 
-def _share(found: Counter[str]) -> str:
+def share(found: Counter[str]) -> str:
+    """How many of hundred are controllable."""
     return f"{100 * found[CONTROLLABLE] / sum(found.values()):.0f}"
-
-
-if __name__ == "__main__":
-    for page, which, tables in PAGES:
-        page.write_text(written(page.read_text(encoding="utf-8"), load(which), tables), encoding="utf-8", newline="\n")

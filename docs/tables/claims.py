@@ -1,7 +1,7 @@
 """Every word of certainty that the program prints: what it stands for, by which computation, on which assumptions, and
 the test that would fail if it were false.
 
-``python -m hrsynth.claims FILE`` writes the page of claims. A test (``tests/test_claims.py``) goes through all texts in
+A test (``tests/test_claims.py``) goes through all texts in
 the code and all templates of pages: one that holds a word of certainty (:data:`CERTAIN`) and is covered neither by a
 row ``claim`` of ``claims.toml`` nor by one of ``no_claim`` fails, as does a row that no text needs.
 
@@ -11,7 +11,6 @@ To print a new one: write what computes it, its test, and then its row there.
 from __future__ import annotations
 
 import re
-import sys
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -62,8 +61,8 @@ def page() -> str:
     lines = [
         "# What each word of certainty stands for",
         "",
-        "Each word of certainty that the program prints stands in this table, which is made from the code's own "
-        "(`src/hrsynth/claims.toml`). A test fails if a text holds such a word and is not listed there. What is "
+        "Each word of certainty that the program prints stands in this table, which is made from the project's own "
+        "(`docs/tables/claims.toml`). A test fails if a text holds such a word and is not listed there. What is "
         "not in this table is not claimed.",
         "",
     ]
@@ -80,7 +79,3 @@ def page() -> str:
             "",
         ]
     return "\n".join(lines)
-
-
-if __name__ == "__main__":
-    Path(sys.argv[1]).write_text(page(), encoding="utf-8", newline="\n")

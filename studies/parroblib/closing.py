@@ -13,10 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...budgets import AUDIT_STEPS
-from ...geometry.so3 import exponential, logarithm
-from ...geometry.vectors import Array, cross
-from ...tolerances import AUDIT_DAMPED, AUDIT_FAR, AUDIT_LONGEST, AUDIT_STIFF, SOLVED
+from hrsynth.geometry.so3 import exponential, logarithm
+from hrsynth.geometry.vectors import Array, cross
+from hrsynth.tolerances import SOLVED
+
+from .limits import DAMPED, FAR, LONGEST_STEP, STEPS, STIFF
 from .motions import TURN, TX, LegFactor, dimensions
 
 
@@ -162,8 +163,8 @@ def close(
     state = BatchState(start.lengths.copy(), start.q.copy(), start.p.copy(), start.R.copy())
     poses = start.p.shape[1]
     done, work, part, at = np.zeros(B, dtype=bool), np.arange(B), of, start
-    stiff = np.full(of.count, AUDIT_STIFF if sized else 0.0)
-    for _ in range(AUDIT_STEPS):
+    stiff = np.full(of.count, STIFF if sized else 0.0)
+    for _ in range(STEPS):
         p, R, of_joints, of_lengths = forward(part, at)
         leg_R, leg_p = np.repeat(at.R, n // poses, axis=1), np.repeat(at.p, n // poses, axis=1)
         error = np.concatenate([p - leg_p, logarithm(R @ np.swapaxes(leg_R, -1, -2))], axis=-1)
@@ -172,7 +173,7 @@ def close(
         for whole, some in ((state.lengths, at.lengths), (state.q, at.q), (state.p, at.p), (state.R, at.R)):
             whole[work[ready]] = some[ready]
         done[work[ready]] = True
-        keep = ~ready & (size < AUDIT_FAR)
+        keep = ~ready & (size < FAR)
         if not keep.any():
             break
         work, part, at, p, of_joints, of_lengths, error = (
@@ -225,7 +226,7 @@ def _of_poses(at: BatchState, turning: Array, shifting: Array, n: int) -> Array:
 def _step(J: Array, weights: Array, error: Array) -> Array:
     """The damped step of least weighted length that cancels the error to first order, no longer than allowed."""
     A = (J * weights).reshape(len(J), error.shape[1], -1)
-    damping = np.minimum(AUDIT_DAMPED, AUDIT_DAMPED * np.sum(error**2, axis=1)) + SOLVED
+    damping = np.minimum(DAMPED, DAMPED * np.sum(error**2, axis=1)) + SOLVED
     H = A @ np.swapaxes(A, -1, -2) + damping[:, None, None] * np.eye(error.shape[1])
     x = -weights * (np.swapaxes(A, -1, -2) @ np.linalg.solve(H, error[..., None]))[..., 0]
-    return np.asarray(x * np.minimum(1.0, AUDIT_LONGEST / np.maximum(np.abs(x).max(axis=1), AUDIT_LONGEST))[:, None])
+    return np.asarray(x * np.minimum(1.0, LONGEST_STEP / np.maximum(np.abs(x).max(axis=1), LONGEST_STEP))[:, None])

@@ -12,15 +12,16 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BadRequest
-from ..geometry.vectors import Array, cross
-from ..mechanism.builder import Builder
-from ..mechanism.model import Mechanism
-from .audit.study import StudyCase
-from .audit.study import study as closed
-from .audit.tables import BASE_PAIRS, PLATFORM_PAIRS, Held, PublishedRobot, read
-from .build import WordSource
-from .entry import study
+from hrsynth.catalog.build import WordSource
+from hrsynth.catalog.entry import study
+from hrsynth.errors import BadRequest
+from hrsynth.geometry.vectors import Array, cross
+from hrsynth.mechanism.builder import Builder
+from hrsynth.mechanism.model import Mechanism
+
+from .study import StudyCase
+from .study import study as closed
+from .tables import BASE_PAIRS, PLATFORM_PAIRS, Held, PublishedRobot, read
 
 
 def published_words(folder: str | Path) -> WordSource:

@@ -1,15 +1,13 @@
-"""The table of the catalog; ``python -m hrsynth.catalog.readme docs/pages/catalog.md`` writes it between its marks."""
+"""The table of the catalog, on the page docs/pages/catalog.md."""
 
 from __future__ import annotations
 
-import sys
+from hrsynth.analysis.verdict import BLIND, CONTROLLABLE, PARTIAL
+from hrsynth.catalog.query import Catalog, load
+from hrsynth.catalog.store import shipped_folder
+from hrsynth.catalog.words import SENSORS
 
-from ..analysis.verdict import BLIND, CONTROLLABLE, PARTIAL
-from ..present.markdown import rewrite
-from ..present.markdown import table as markdown
-from .query import Catalog, load
-from .store import shipped_folder
-from .words import SENSORS
+from .markdown import table as markdown
 
 START = "<!-- generated: catalog -->"
 VERDICTS = (CONTROLLABLE, PARTIAL, BLIND, None)
@@ -27,8 +25,3 @@ def table(catalog: Catalog | None = None) -> str:
 def _row(name: str, catalog: Catalog) -> list[str]:
     counts = catalog.count("verdict")
     return [name, f"{len(catalog):,}", *(f"{counts.get((verdict,), 0):,}" for verdict in VERDICTS)]
-
-
-if __name__ == "__main__":
-    for argument in sys.argv[1:]:
-        rewrite(argument, {START: table})

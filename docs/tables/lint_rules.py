@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from ..linting.rules import lint_rules
+from hrsynth.linting.rules import lint_rules
+
 from .markdown import table as markdown
 
 START = "<!-- generated: rules -->"

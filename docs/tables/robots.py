@@ -1,16 +1,14 @@
-"""Generated tables; ``python -m hrsynth.present.readme FILE …`` writes each between its marks where a file has them."""
+"""The table of the shipped robots, on the page robots/README.md."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Sequence
 
-from ..analysis.controllability import legs
-from ..analysis.derive import derive
-from ..analysis.singularity.singular import singular
-from ..description import load, shipped
-from . import lint_rules, observation_kinds, printed, replays
-from .markdown import rewrite
+from hrsynth.analysis.controllability import legs
+from hrsynth.analysis.derive import derive
+from hrsynth.analysis.singularity.singular import singular
+from hrsynth.description import load, shipped
+
 from .markdown import table as markdown
 
 START = "<!-- generated: robots -->"
@@ -70,15 +68,3 @@ def _smallest(sets: Sequence[Sequence[str]]) -> str:
     if len(sets) > _LONGEST_LIST:
         return f"{shown[0]} and {len(sets) - 1} more"
     return " ".join(shown)
-
-
-if __name__ == "__main__":
-    for argument in sys.argv[1:]:
-        rewrite(
-            argument,
-            {
-                START: table,
-                printed.FORMS_START: printed.forms_table,
-                **{each.START: each.table for each in (printed, replays, lint_rules, observation_kinds)},
-            },
-        )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from .tables import listing, table
+from hrsynth.present.text.tables import listing, table
 
 HEADS = ("group", "robots", "moves so", "further", "not found", "losses", "agree", "in stated", "counts", "agree")
 SHOWN = 5

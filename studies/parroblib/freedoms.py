@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...geometry.vectors import Array
-from ...tolerances import RANK_CUTOFF
+from hrsynth.geometry.vectors import Array
+from hrsynth.tolerances import RANK_CUTOFF
 
 
 @dataclass(frozen=True, eq=False)

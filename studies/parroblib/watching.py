@@ -12,8 +12,9 @@ from itertools import combinations
 
 import numpy as np
 
-from ...geometry.vectors import Array, cross, hat
-from ...tolerances import RANK_GAP, SAME_DIRECTION
+from hrsynth.geometry.vectors import Array, cross, hat
+from hrsynth.tolerances import RANK_GAP, SAME_DIRECTION
+
 from .freedoms import count_ranks, denied_freedoms
 
 

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ...budgets import AUDIT_BATCH
-from ...errors import BadRequest, Defect
+from hrsynth.errors import BadRequest, Defect
+
 from .compare import CLASSES, SETTLED, compare_robot
+from .limits import BATCH
 from .study import Studied, StudyCase, study
 from .tables import PublishedRobot, PublishedTables, read
 
@@ -129,12 +130,12 @@ def audit(
     lost = [each for each in tables.no_chain if only in (None, each[0])]
     head = {"audit": str(folder), "only": only, "sample": sample, "seed": seed, "robots": len(robots)}
     with _Kept(kept, head) as done:
-        for k in range(0, len(robots), AUDIT_BATCH):
-            chunk = robots[k : k + AUDIT_BATCH]
+        for k in range(0, len(robots), BATCH):
+            chunk = robots[k : k + BATCH]
             if any(_key(robot) not in done.records for robot in chunk):
                 done.add(list(_chunk(chunk, seed)))
             if tell is not None:
-                tell(chunk[-1].group, min(k + AUDIT_BATCH, len(robots)), len(robots))
+                tell(chunk[-1].group, min(k + BATCH, len(robots)), len(robots))
         records = tuple(done.records[_key(robot)] for robot in robots)
     rows = len(robots) + (len(lost) if sample is None else 0)
     return TableAudit(str(folder), rows, records, tuple(tables.defects), tuple(lost))

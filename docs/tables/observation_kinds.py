@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..geometry.vectors import frozen, unit
-from ..mechanism.notation import Letter, Word
-from ..mechanism.observations import kinds
-from ..mechanism.sights import Sighting
+from hrsynth.geometry.vectors import frozen, unit
+from hrsynth.mechanism.notation import Letter, Word
+from hrsynth.mechanism.observations import kinds
+from hrsynth.mechanism.sights import Sighting
+
 from .markdown import table as markdown
 
 START = "<!-- generated: kinds -->"
