@@ -1,6 +1,6 @@
 """The table of benchmarks: each line a ratio against another's way, measured in the same run.
 
-    python benchmarks/table.py [docs/pages/batches.md]
+    python benchmarks/table.py [benchmarks/README.md]
 
 Times are the least processor time of several turns, ours and theirs in turn, on one core, after imports and after numba
 has compiled. Both sides compute the same thing, which is checked. Without a file the table is printed.

@@ -1,4 +1,4 @@
-"""Published robots as entries of the catalog: what the tables of others (docs/pages/audit.md) name, with dimensions of
+"""Published robots as entries of the catalog: what the tables of others (README.md) name, with dimensions of
 our own: random ones that close in the stated motion, the same in all legs."""
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Published tables of symmetric parallel robots, read: leg chains, robots, their motors, what a synthesis found.
 
-The format is told in docs/pages/audit.md. A table may lack columns at its end, and figures that it states may be empty:
+The format is told in README.md. A table may lack columns at its end, and figures that it states may be empty:
 what is not stated is None. What cannot be read, contradicts itself or is told twice is a
 :class:`~hrsynth.errors.Defect` with its file and line, and the rows that need it are left out.
 """
@@ -131,7 +131,7 @@ def read(folder: str | Path) -> PublishedTables:
     """The tables of a folder; raises ``BadRequest`` where it holds none."""
     root = Path(folder)
     if not root.is_dir():
-        raise BadRequest("no folder of tables", str(folder), "a folder with chains/ and robots/ (docs/pages/audit.md)")
+        raise BadRequest("no folder of tables", str(folder), "a folder with chains/ and robots/ (README.md)")
     lists = sorted((root / "robots").glob("sym_*_list.csv"))
     if not lists:
         raise BadRequest("no table of robots", str(root / "robots"), "sym_3T0R_list.csv and the like")
