@@ -17,7 +17,7 @@ LOCK = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generat
 	--no-annotate --custom-compile-command "make lock" $(LOCKFLAGS) pyproject.toml --group build
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all test-long fuzz adversary bounds endings bench lint types robots readme catalog notebooks jupyter docs pictures lock three release setup setup-dev setup-all setup-browser clean
+.PHONY: help demo test test-all test-long fuzz adversary bounds endings files parroblib bench lint types robots readme catalog notebooks jupyter docs pictures lock three release setup setup-dev setup-all setup-browser clean
 .DELETE_ON_ERROR:
 
 help:  ## this list
@@ -28,11 +28,11 @@ demo: setup  ## derive the hidden robot of a Quattro of which legs 1 and 4 are o
 
 # a file's tests go to one process: what they share is derived once
 test: setup-dev  ## the tests, without the slow ones
-	@$(PYTEST) --dist loadfile -m "not slow and not long and not browser" tests
+	@$(PYTEST) --dist loadfile -m "not slow and not long and not browser" tests studies
 
 # the heavy ones stand beside each other: who has done its own takes from the other's
 test-all: setup-all setup-browser  ## all tests but the longest (AFTER_TEST=1: those that `make test` left out)
-	@$(PYTEST) --dist worksteal -m "$(if $(AFTER_TEST),(slow or browser) and )not long" tests
+	@$(PYTEST) --dist worksteal -m "$(if $(AFTER_TEST),(slow or browser) and )not long" tests studies
 
 test-long: setup-all  ## the tests that are left: all members of each law, many instances; hours
 	@$(PYTEST) -m long tests
@@ -57,11 +57,9 @@ types: setup-dev  ## type check
 robots: setup  ## regenerate robots/*.urdf from the families
 	@$(BIN)/python -m hrsynth.families
 
-readme: setup  ## regenerate the tables of robots/README.md and of docs/pages
-	@$(BIN)/python -m hrsynth.present.readme robots/README.md docs/pages/papers.md docs/pages/lint.md
-	@$(BIN)/python -m hrsynth.catalog.readme docs/pages/catalog.md
-	@$(BIN)/python docs/catalog_says.py
-	@$(BIN)/python -m hrsynth.claims docs/pages/claims.md
+readme: setup  ## regenerate the tables of robots/README.md, docs/pages and studies/
+	@cd docs && ../$(BIN)/python -m tables
+	@cd studies && PYTHONPATH=../docs ../$(BIN)/python -m parroblib.says
 
 catalog: setup-all  ## build catalog/, or go on where that was broken off (JOBS= processes; hours)
 	@$(BIN)/hrsynth catalog build --workers $(JOBS)
@@ -76,12 +74,19 @@ jupyter: setup-all  ## open the notebooks in Jupyter, which is fetched the first
 docs: setup-all  ## run the notebooks that changed and build the site in build/site
 	@NO_MKDOCS_2_WARNING=1 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/mkdocs build --quiet --strict
 
-endings: setup-dev  ## how 100 far servo runs of every robot end, checked, against the lists, as tables in docs/pages (an hour; a broken-off run goes on)
+endings: setup-dev  ## how 100 far servo runs of every robot end, checked, against the lists, as tables in studies/endings (an hour; a broken-off run goes on)
 	@mkdir -p build && cd tests && OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 ../$(BIN)/python -m simulation.far 100 --random 57 \
-		--log ../build/far.jsonl -o ../docs/pages/endings.md
+		--log ../build/far.jsonl -o ../studies/endings/README.md
 
-bench: setup-all  ## run the benchmarks and write their table in docs/pages (some minutes)
-	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python benchmarks/table.py docs/pages/batches.md
+files: setup-dev  ## read robot files of others again (OTHERS=folder with clones of their repositories: studies/files)
+	@HRSYNTH_OTHERS="$(abspath $(OTHERS))" $(PYTEST) tests/description/foreign/test_others.py
+
+parroblib: setup-dev  ## compare published tables of robots with what is computed (TABLES=folder; an hour; a broken-off run goes on)
+	@test -d "$(TABLES)" || { echo "TABLES=FOLDER: a folder of published tables (studies/parroblib/README.md)" >&2; exit 2; }
+	@mkdir -p build && cd studies && ../$(BIN)/python -m parroblib audit "$(abspath $(TABLES))" --sample 2200 -o ../build/parroblib.jsonl
+
+bench: setup-all  ## run the benchmarks and write their table in benchmarks/ (some minutes)
+	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python benchmarks/table.py benchmarks/README.md
 
 pictures: setup-all setup-browser  ## draw the pictures in docs/pictures again (ten minutes)
 	@$(BIN)/python docs/pictures.py

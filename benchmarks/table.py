@@ -1,6 +1,6 @@
 """The table of benchmarks: each line a ratio against another's way, measured in the same run.
 
-    python benchmarks/table.py [docs/pages/batches.md]
+    python benchmarks/table.py [benchmarks/README.md]
 
 Times are the least processor time of several turns, ours and theirs in turn, on one core, after imports and after numba
 has compiled. Both sides compute the same thing, which is checked. Without a file the table is printed.
@@ -12,12 +12,14 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "docs"))
+
 from generated import generated
 from measure import Row
 from others import catalog, derivations, jacobians, modes, platforms
 from sweeps import exact_maxima, growth, matrices, other_twists
 
-from hrsynth.present.markdown import replace_between, table
+from tables.markdown import replace_between, table
 
 START = "<!-- generated: benchmarks -->"
 

@@ -1,4 +1,5 @@
-"""Contact sheets of the studio's panels, for ``docs/pictures.py``: wide ones above, as a telephone has them below."""
+"""Screens of the studio: one panel for ``docs/pictures.py``; or, to look at before and after a change, all panels of a
+robot on one sheet, wide ones above, as a telephone has them below: ``python docs/panels.py delta sheet.webp``."""
 
 from __future__ import annotations
 
@@ -78,6 +79,23 @@ ROBOTS: dict[str, Callable[[Path], str | Path]] = {
     "five_bar_meshes": meshed,
 }
 """What is opened, by the name of its sheet."""
+
+
+def screen(name: str, key: str, file: Path) -> None:
+    """Draw one panel of a robot."""
+    from PIL import Image
+
+    from browser import Tab, running
+    from hrsynth.present.studio.server import studio
+
+    with tempfile.TemporaryDirectory() as folder, running() as browser:
+        server = studio(ROBOTS[name](Path(folder)), open_=False)
+        width, height = WIDE
+        tab = Tab.of(browser.new_page(viewport={"width": width, "height": height}, reduced_motion="reduce"))
+        tab.open(server.address)
+        next(each for each in shown(tab.page) if each == key)
+        Image.fromarray(tab.picture()).save(file, quality=80, method=6)
+        server.stop()
 
 
 def sheet(name: str, file: Path) -> None:
@@ -164,3 +182,7 @@ def settled(page: Any) -> None:
             break
         page.wait_for_timeout(100)
     page.wait_for_timeout(300)
+
+
+if __name__ == "__main__":
+    sheet(sys.argv[1], Path(sys.argv[2]))

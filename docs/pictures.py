@@ -60,8 +60,8 @@ def command(name: str) -> str:
         )
     if isinstance(what, Family):
         return f"hrsynth {what.command} {what.robot}.urdf -o {name}"
-    if isinstance(what, Panels):
-        return f"hrsynth studio {what.typed}"
+    if isinstance(what, Screen):
+        return f"hrsynth studio {what.robot}"
     if name.startswith("derivation_"):
         robot, legs = what.split()
         return f'hrsynth.draw(hrsynth.derive("{robot}", observe="{legs}"))'
@@ -85,14 +85,14 @@ class Family:
 
 
 @dataclass(frozen=True)
-class Panels:
-    """All panels of ``hrsynth studio`` for the robot of a sheet of ``docs/panels.py``, opened as it is ``typed``."""
+class Screen:
+    """A panel of ``hrsynth studio`` for a robot of ``docs/panels.py``."""
 
     robot: str
-    typed: str
+    panel: str
 
 
-PICTURES: dict[str, str | Page | SitePage | Family | Panels] = {
+PICTURES: dict[str, str | Page | SitePage | Family | Screen] = {
     "accuracy_quattro.png": "accuracy quattro --observe 1,4 --cone 0.1deg --plane z=-0.7",
     "atlas_six_poses.png": Family("atlas", "six_poses"),
     "basins_quattro.png": "basins quattro --observe 1,4 --to x=0,y=0,z=-0.7,phi=0 --plane z=-0.7,phi=0",
@@ -118,12 +118,8 @@ PICTURES: dict[str, str | Page | SitePage | Family | Panels] = {
     "servo_quattro.gif": f"servo quattro --observe 1,4 {FAR} --physics --sense pictures",
     "servo_quattro.png": f"servo quattro --observe 1,4 {FAR}",
     "site.png": SitePage("index.html", 1250, 1250),
-    "studio_3rrr_tilted.webp": Panels("3rrr_tilted", "3rrr_m1_tilted.urdf"),
-    "studio_ankle.webp": Panels("ankle", "ankle.urdf"),
-    "studio_delta.webp": Panels("delta", "delta"),
-    "studio_five_bar_meshes.webp": Panels("five_bar_meshes", "five_bar.xml"),
-    "studio_gough_stewart.webp": Panels("gough_stewart", "gough_stewart"),
-    "studio_quattro.webp": Panels("quattro", "quattro"),
+    "studio_legs.webp": Screen("quattro", "lost"),
+    "studio_plane.webp": Screen("quattro", "plane"),
     "view_3rrr.png": view("3rrr_m1"),
     "view_gough_stewart.png": view("gough_stewart --observe 1,3,5"),
     "view_quattro.png": view("quattro --observe 1,4"),
@@ -163,10 +159,10 @@ def made(name: str) -> None:
         with tempfile.TemporaryDirectory() as folder:
             main(folder, what.robot)
             _run(f"{what.command} {folder}/{what.robot}.urdf -o {file}")
-    elif isinstance(what, Panels):
+    elif isinstance(what, Screen):
         import panels
 
-        panels.sheet(what.robot, file)
+        panels.screen(what.robot, what.panel, file)
     elif name.startswith("derivation_"):
         robot, legs = what.split()
         hrsynth.draw(hrsynth.derive(hrsynth.load(robot), legs.split(","))).save(str(file))

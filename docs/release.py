@@ -39,7 +39,7 @@ NEEDED = (
     "docs/pages/theory.md",
     "tests/oracle.py",
     "benchmarks/table.py",
-    "src/hrsynth/claims.toml",
+    "studies/parroblib/README.md",
 )
 """What a source archive must hold, of each kind of file something."""
 PACKAGED = ("hrsynth/robots/quattro.urdf", "hrsynth/catalog/shipped/mixed.jsonl.gz")

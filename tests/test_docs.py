@@ -24,8 +24,18 @@ PAGES = sorted((ROOT / "docs" / "pages").glob("*.md"))
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.name)
 def test_what_a_page_names_is_there(page: Path):
     """Paths of the project in code style."""
-    named = re.findall(r"`((?:src|docs|tests|notebooks|robots|catalog)/[\w/.]*)`", page.read_text(encoding="utf-8"))
+    text = page.read_text(encoding="utf-8")
+    named = re.findall(r"`((?:src|docs|tests|notebooks|robots|catalog|studies)/[\w/.]*)`", text)
     assert [name for name in named if not (ROOT / name).exists()] == []
+
+
+def test_ten_numbers_say_by_which_command_they_are_made_again():
+    text = (ROOT / "docs" / "pages" / "how_sure.md").read_text(encoding="utf-8")
+    assert len(re.findall(r"^\| \d+\. .* \| `(?:make|python) [^|]*\|$", text, re.MULTILINE)) == 10
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    assert [name for name in re.findall(r"`make (\w+)", text) if f"\n{name}:" not in makefile] == []
+    modules = re.findall(r"`python -m ([\w.]+)", text)
+    assert [name for name in modules if not (ROOT / "tests" / f"{name.replace('.', '/')}.py").exists()] == []
 
 
 def test_the_architecture_page_tells_of_every_folder():

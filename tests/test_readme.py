@@ -10,12 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from hrsynth.catalog import readme as catalog
 from hrsynth.cli import execute
 from hrsynth.description import shipped
-from hrsynth.families.replays import REPLAYS, SIMULATED
-from hrsynth.present import observation_kinds, readme, replays
-from hrsynth.present.markdown import block, line, replace_between
+from tables import catalog, observation_kinds, replays, robots
+from tables.markdown import block, line, replace_between
+from tables.printed_runs import REPLAYS, SIMULATED
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = ROOT / "docs" / "pages"
@@ -33,19 +32,19 @@ differ from machine to machine."""
 
 
 def lines() -> dict[str, str]:
-    rows = block(ROBOTS, readme.START).splitlines()[2:]
+    rows = block(ROBOTS, robots.START).splitlines()[2:]
     return {re.match(r"\| `(\w+)` \|", row)[1]: row for row in rows}
 
 
 def test_the_table_has_every_shipped_robot_in_order():
     assert list(lines()) == list(shipped())
-    assert block(ROBOTS, readme.START).splitlines()[:2] == readme.table([]).splitlines()
+    assert block(ROBOTS, robots.START).splitlines()[:2] == robots.table([]).splitlines()
 
 
 @pytest.mark.some(1, 7)
 @pytest.mark.parametrize("name", sorted(shipped(), key="3prp".__ne__))
 def test_the_row_of_a_robot_is_fresh(name: str):
-    assert lines()[name] == line(readme.row(name)), "the page is stale: make readme"
+    assert lines()[name] == line(robots.row(name)), "the page is stale: make readme"
 
 
 @pytest.mark.some(1)
@@ -75,12 +74,12 @@ def test_the_table_of_the_catalog_is_fresh():
 
 
 def test_the_text_outside_the_marks_is_kept():
-    assert replace_between(ROBOTS, block(ROBOTS, readme.START), readme.START) == ROBOTS
-    other = replace_between(ROBOTS, "none at all\n", readme.START)
-    assert block(other, readme.START) == "none at all\n"
-    assert replace_between(other, block(ROBOTS, readme.START), readme.START) == ROBOTS
+    assert replace_between(ROBOTS, block(ROBOTS, robots.START), robots.START) == ROBOTS
+    other = replace_between(ROBOTS, "none at all\n", robots.START)
+    assert block(other, robots.START) == "none at all\n"
+    assert replace_between(other, block(ROBOTS, robots.START), robots.START) == ROBOTS
     with pytest.raises(ValueError, match="generated: robots"):
-        replace_between("# without marks\n", "nothing\n", readme.START)
+        replace_between("# without marks\n", "nothing\n", robots.START)
 
 
 def test_the_readme_is_short():

@@ -447,18 +447,3 @@ BOXES_ALONE = 400_000
 """Boxes of them that are looked at before the work is shared among processes."""
 BOX_PARTS, BOXES_A_PART = 16, 200_000
 """Into how many parts it is then split, and how many boxes of each are looked at before it is split again."""
-
-# The audit of published tables
-
-AUDIT_STEPS = 60
-"""Steps in which a published robot is closed from a random start, or is not."""
-AUDIT_TRIALS = 12
-"""Random starts of each published robot, and again as many where its dimensions are to obey a relation."""
-AUDIT_POSES = 4
-"""Poses at which dimensions have to close at once there."""
-LARGEST_CELL = 1e6
-"""The largest number in a cell of a published table, and the largest inverse of one that is not zero."""
-AUDIT_BATCH = 128
-"""Robots that are closed together."""
-AUDIT_DRAWS = 12
-"""Draws of the turns of a leg, in exact arithmetic, before its orientation is given up."""

@@ -462,21 +462,3 @@ SINGULAR_FINER = SINGULAR_BOX / 4, SINGULAR_BOX / 16, SINGULAR_BOX / 64
 """Parts of the whole to which such boxes are cut, one after the other, where they fill more than one place together."""
 LOCKED_PLACE = 0.01
 """Longest edge of what such boxes fill together, as part of all, to be told as one place; what is longer is open."""
-
-# The audit of published tables
-
-AUDIT_STIFF = 0.2
-"""How far dimensions follow, beside joints and poses, when a robot with random ones is closed."""
-AUDIT_DAMPED = 1e-2
-"""Damping of the closing of published robots, as part of the squared residual, and its largest value."""
-AUDIT_LONGEST = 0.4
-"""Longest step (metres, radians) of one unknown there."""
-AUDIT_FAR = 1e3
-"""Residual (metres, radians) at which a start is given up there."""
-AUDIT_CHANGED = 0.05
-"""Relative change of each dimension, and step (metres, radians) of each joint, after which a robot is closed again:
-what it does then belongs to generic dimensions."""
-AUDIT_SLIGHT = 0.03
-"""Dimension (metres, radians) below which a robot counts as closed by a degenerate one."""
-AUDIT_TURNED = 1e-3
-"""Turn (radians) off the stated motion below which a platform counts as not having left it."""

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hrsynth.catalog.fits import FIELDS, TEXTS, fits, may_fit
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -20,7 +21,6 @@ import hrsynth
 from catalog.stub import CHAINS, QUESTIONS, REFUSED, VERDICTS, WORKERS, entry, source, without_checksum
 from hrsynth.catalog import Catalog, load
 from hrsynth.catalog.build import build, check
-from hrsynth.catalog.fits import FIELDS, TEXTS, fits, may_fit
 from hrsynth.catalog.jsonl import COUNTS, FLAGS, LISTS, Record, line, record, word_of
 from hrsynth.catalog.jsonl import TEXTS as TEXT_FIELDS
 from hrsynth.catalog.query import count, groups_of, values

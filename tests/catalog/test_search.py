@@ -7,11 +7,11 @@ from fnmatch import translate
 
 import numpy as np
 import pytest
+from hrsynth.catalog.search import Texts, narrow_type
 from hypothesis import given
 from hypothesis import strategies as st
 
 from hrsynth.catalog import search
-from hrsynth.catalog.search import Texts, narrow_type
 
 LETTERS = st.text(st.sampled_from("abR*?[-(\n\0\u00df\u20ac\udcff"), max_size=12)
 PLAIN = st.text(st.sampled_from("ab-R"), max_size=60)

@@ -14,10 +14,10 @@ from description.foreign.examples import FILES
 from hrsynth.cli import execute
 from hrsynth.linting.findings import SEVERITIES
 from hrsynth.linting.rules import lint_rules
-from hrsynth.present import lint_rules as page
-from hrsynth.present.markdown import block
 from hrsynth.present.text.lint import github, sarif
 from linting.defects import CASES, damaged, put, sound
+from tables import lint_rules as page
+from tables.markdown import block
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = {"type": "object", "required": ["text"], "properties": {"text": {"type": "string", "minLength": 1}}}

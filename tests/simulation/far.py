@@ -31,7 +31,6 @@ from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.locked import interaction
 from hrsynth.kinematics.relation import relation
 from hrsynth.mechanism.model import Mechanism
-from hrsynth.present.markdown import replace_between, table
 from hrsynth.simulation.ending import ANTIPODAL, BOUNDARY, ENDINGS, GOAL, MINIMUM, MODE
 from hrsynth.simulation.law import FixedDirections, Law, directions
 from hrsynth.simulation.result import Servo
@@ -40,6 +39,7 @@ from kinematics.robots import state_of
 from oracle import Oracle
 from simulation.listed import MEMBER, Listed, Lists, random_sets
 from simulation.scenes import CONTROLLABLE, Legs, far_pairs, setting
+from tables.markdown import replace_between, table
 
 START, MEMBERS = "<!-- generated: endings -->", "<!-- generated: members -->"
 OF_ONE_SET = 3

@@ -130,7 +130,7 @@ class Catalog(Value):
 
 def load(path: str | Path | None = None, **asked: Any) -> Catalog:
     """The shipped catalog, or that of a folder or SQLite file; ``published``: the shipped one of published robots
-    (docs/pages/audit.md); ``all``: both. ``asked`` as for ``Catalog.where``.
+    (studies/parroblib); ``all``: both. ``asked`` as for ``Catalog.where``.
 
     What is seen of platforms instead of legs (the group ``sensors``) is left out unless ``group`` or ``see`` asks for
     it. Of a SQLite file only the records that fit are read. Raises ``BadRequest`` if there is no catalog, or one of

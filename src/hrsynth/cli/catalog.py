@@ -1,10 +1,10 @@
-"""The commands of the catalog: build, list, show, site, audit.
+"""The commands of the catalog: build, list, show, site.
 
 Their records, besides ``command`` ("catalog build" …) and ``version``: ``build`` gives ``groups``, each with
 ``group``, ``words``, ``now`` (made), ``before`` and ``file`` (null while it is not complete), with ``--check`` instead
 ``stale``, one text for each thing; ``list`` gives ``total``, ``groups`` (those that are covered) and ``entries``;
 ``show`` gives ``entry``, ``drawing`` (lines), ``note``, ``smallest`` (the smallest sets with their hidden robots) and
-``file``; ``site`` as told by ``catalog site --help``; ``audit`` its table by groups and every disagreement.
+``file``; ``site`` as told by ``catalog site --help``.
 """
 
 from __future__ import annotations
@@ -26,7 +26,6 @@ from .progress import Progress
 
 if TYPE_CHECKING:
     from ..catalog import Catalog
-    from ..catalog.build import WordSource
     from ..mechanism import Mechanism
 
 catalog = Group(
@@ -43,11 +42,6 @@ KEPT = Option(
     flags=("--catalog",),
 )
 WORKERS = Option("workers", "Processes that share the work.", None, int, 1, low=1)
-TABLES = Option(
-    "tables",
-    "Take robots of published tables (their format is on the page 'audit') instead of the words listed here.",
-    "FOLDER",
-)
 ANEW = flag("anew", "Discard the results of an interrupted build.")
 FILTER = (
     Option("legs", "Number of legs, or a pattern of the notation or of one leg's chain: 3-R*, PUS.", "LEGS"),
@@ -183,81 +177,6 @@ class CatalogSite(Head):
     differ: list[Differing]
 
 
-class AuditedKind(TypedDict):
-    """How often a kind of disagreement occurs that is settled in this way."""
-
-    kind: str
-    settled: str
-    number: int
-
-
-class AuditedSight(TypedDict):
-    """How many robots have this verdict, at generic dimensions with all legs watched, and need at least so many legs to
-    show as much as all."""
-
-    verdict: str
-    fewest: int
-    number: int
-
-
-class AuditedGroup(TypedDict):
-    """A group of published robots: how many were compared, and how many move as stated or further; how many of the
-    stated losses of rank, and of the stated numbers of working choices of motors, agree."""
-
-    group: str
-    robots: int
-    without_chain: int
-    moves_as_stated: int
-    moves_further: int
-    not_found: int
-    choices: int
-    choices_agree: int
-    choices_agree_in_stated: int
-    choices_not_stated: int
-    choices_not_compared: int
-    counts: int
-    counts_agree: int
-    watching: list[AuditedSight]
-    kinds: list[AuditedKind]
-
-
-class TableDisagreementRecord(TypedDict):
-    """A figure of a table that differs from what is computed, with its file and line, its kind and what settles it."""
-
-    robot: str
-    group: str
-    at: str
-    kind: str
-    theirs: str
-    ours: str
-    settled: str
-
-
-class NoLegChain(TypedDict):
-    """A robot whose leg chain is in no table."""
-
-    group: str
-    robot: str
-    chain: str
-
-
-class CatalogAudit(Head):
-    """Published tables compared: `rows` of them, `compared` ones, those that `agree` with everything that is stated;
-    `kinds` and `settlements` in words; `file` has the records with their instances modulo primes."""
-
-    folder: str
-    rows: int
-    compared: int
-    agree: int
-    groups: list[AuditedGroup]
-    kinds: dict[str, str]
-    settlements: dict[str, str]
-    disagreements: list[TableDisagreementRecord]
-    defects: list[str]
-    without_chain: list[NoLegChain]
-    file: str | None
-
-
 def _say(command: str, fields: dict[str, Any], text: str, json: bool) -> None:
     from ..present.show import record
 
@@ -267,7 +186,6 @@ def _say(command: str, fields: dict[str, Any], text: str, json: bool) -> None:
 def build(
     groups: list[str] | None,
     output: str | None,
-    tables: str | None,
     workers: int,
     cluster: str | None,
     check: bool,
@@ -284,9 +202,6 @@ def build(
     for option, given in senseless.items():
         if given:
             raise BadRequest(f"{option} {'with' if check else 'without'} --check", None)
-    if tables is not None and output is None:
-        raise BadRequest("--tables needs a catalog of its own", None, "-o FOLDER or -o FILE.sqlite")
-    source = None if tables is None else _published_words(tables)
     if check:
         from ..catalog.build import check as run
         from ..catalog.store import shipped_folder
@@ -295,7 +210,6 @@ def build(
             stale = run(
                 output or shipped_folder(),
                 groups or [],
-                source=source,
                 workers=workers,
                 cluster=cluster,
                 sample=sample,
@@ -317,7 +231,6 @@ def build(
             for each in make(
                 target,
                 groups or [],
-                source=source,
                 workers=workers,
                 cluster=cluster,
                 limit=limit,
@@ -404,7 +317,7 @@ def _require_known(kept: str | None, asked: dict[str, Any]) -> None:
         )
 
 
-def show(word: str, output: str | None, tables: str | None, kept: str | None, json: bool) -> None:
+def show(word: str, output: str | None, kept: str | None, json: bool) -> None:
     """Show one architecture."""
     from ..catalog.entry import smallest_sets
     from ..description import save, targets
@@ -414,7 +327,7 @@ def show(word: str, output: str | None, tables: str | None, kept: str | None, js
     if output is not None:
         targets(output)
     with Progress():
-        found = _of_word(word, kept) if tables is None else _of_tables(word, tables, kept)
+        found = _of_word(word, kept)
         if output is not None:
             if "refused" in found.record:
                 raise BadRequest(
@@ -457,7 +370,9 @@ class _Shown:
 def _no_geometry(name: str) -> Mechanism:
     from ..errors import BadRequest
 
-    raise BadRequest("a published robot's chain is in its tables", name, "--tables FOLDER")
+    raise BadRequest(
+        "a published robot's chain is in its tables", name, "python -m parroblib robot (studies/parroblib)"
+    )
 
 
 def _of_word(text: str, kept: str | None) -> _Shown:
@@ -480,21 +395,6 @@ def _of_word(text: str, kept: str | None) -> _Shown:
         lambda: mechanism(architecture, record.get("attempt", 0)),
         lambda: mechanism(model(architecture), record.get("attempt", 0)),
     )
-
-
-def _of_tables(name: str, folder: str, kept: str | None) -> _Shown:
-    from ..catalog import load
-    from ..catalog.build import make_records
-    from ..catalog.published import PublishedEntry, mechanism, published_robot
-
-    robot = published_robot(folder, name)
-    found = None if kept is None else load(kept)
-    if found is not None and name in found:
-        record, note = found[name], ""
-    else:
-        ((_, line),) = make_records(PublishedEntry(folder), robot.group, [name])
-        record, note = javascript.loads(line), "studied now"
-    return _Shown(record, "", note, lambda: mechanism(robot), lambda: mechanism(robot))
 
 
 def site(output: str, workers: int, anew: bool, kept: str | None, json: bool, **asked: Any) -> None:
@@ -525,28 +425,6 @@ def site(output: str, workers: int, anew: bool, kept: str | None, json: bool, **
             f"{len(done.differ)} derivations do not end in what the catalog says, the first: {word}, derived {derived}"
         )
     _say("site", done.to_dict(), describe_site(done.to_dict()), json)
-
-
-def audit(folder: str, output: str | None, only: str | None, sample: int | None, json: bool, seed: int) -> None:
-    """Compare published tables of symmetric robots with what is computed."""
-    from ..catalog.audit.run import audit as run
-    from ..errors import BadRequest
-    from ..present.text.audit import describe_audit
-
-    if output is not None and Path(output).suffix != ".jsonl":
-        raise BadRequest("records are kept one per line", output, "a file that ends in .jsonl")
-    with Progress(counted=True) as progress:
-        found = run(
-            folder,
-            only=only,
-            sample=sample,
-            seed=seed,
-            kept=output,
-            tell=lambda _, done, total: progress.count("robots", done, total),
-        ).to_dict()
-    for defect in found["defects"]:
-        warn(defect)
-    _say("audit", {**found, "file": output}, describe_audit(found), json)
 
 
 def _word(text: str, kept: str | None) -> tuple[str, str]:
@@ -591,12 +469,6 @@ def _known_record(word: str, kept: str | None) -> tuple[Any, str]:
     return javascript.loads(line), "not in the catalog, studied now"
 
 
-def _published_words(folder: str) -> WordSource:
-    from ..catalog.published import published_words
-
-    return published_words(folder)
-
-
 def _target(output: str | None) -> Path:
     """Where to build: what was named, or ``catalog/`` of the checkout; never an installed package."""
     from importlib import resources
@@ -620,7 +492,6 @@ COMMANDS = (
         (
             Option("groups", "Groups (default: all).", "[GROUP]...", list[str], argument=True),
             output("A folder, or a file that ends in .sqlite (default: catalog/ of the checkout).", "PATH"),
-            TABLES,
             WORKERS,
             Option("cluster", "A dask cluster that shares the work.", "ADDRESS"),
             flag(
@@ -649,14 +520,12 @@ COMMANDS = (
         (
             Option(
                 "word",
-                "An architecture, such as '3(Rz*-Rz-Rz)', or a name or legs: Delta, 3-RPS; with --tables a robot "
-                "of these.",
+                "An architecture, such as '3(Rz*-Rz-Rz)', or a name or legs: Delta, 3-RPS.",
                 "WORD",
                 default=NEEDED,
                 argument=True,
             ),
             output("Write a robot of this architecture (.urdf, or another dialect)."),
-            TABLES,
             KEPT,
             JSON,
         ),
@@ -675,38 +544,13 @@ COMMANDS = (
             JSON,
         ),
     ),
-    (
-        "audit",
-        "Compare published tables of symmetric parallel robots with what is computed: kind of motion, working "
-        "motors, loss of rank.",
-        audit,
-        (
-            Option(
-                "folder",
-                "A folder with chains/, robots/ and synthesis/ (their format is on the page 'audit').",
-                "FOLDER",
-                default=NEEDED,
-                argument=True,
-            ),
-            output(
-                "Keep the records, one line per robot, with the instances modulo primes; the same command continues "
-                "there.",
-                "FILE.jsonl",
-            ),
-            Option("only", "One group of the tables, such as 3T1R."),
-            Option("sample", "Only this many robots of each group, drawn at random.", "N", int, low=1),
-            JSON,
-            Option("seed", "Seed of --sample and of dimensions and configurations.", None, int, 0, low=0),
-        ),
-    ),
 )
 EXAMPLES = {
-    "build": ("planar -o mine.sqlite", "--check --sample 20", "3T1R --tables tables -o published.sqlite"),
+    "build": ("planar -o mine.sqlite", "--check --sample 20"),
     "list": ("--legs 3-R*RR --verdict controllable", "--motion 2T1R --base-motors --modes 6", "--text Hexaglide"),
-    "show": ("'3(Rz*-Rz-Rz)'", "Delta -o delta.urdf", "P4RPRRR8V1G1P3 --tables tables -o robot.urdf"),
+    "show": ("'3(Rz*-Rz-Rz)'", "Delta -o delta.urdf"),
     "site": ("-o pages --group planar",),
-    "audit": ("tables --only 3T1R", "tables --sample 2000 -o audit.jsonl"),
 }
-RECORDS = {"build": CatalogBuild, "list": CatalogList, "show": CatalogShow, "site": CatalogSite, "audit": CatalogAudit}
+RECORDS = {"build": CatalogBuild, "list": CatalogList, "show": CatalogShow, "site": CatalogSite}
 for name, words, run, options in COMMANDS:
     add_command(catalog, name, words, options, run, EXAMPLES[name], RECORDS[name])

@@ -1406,81 +1406,6 @@ class CatalogSite(Head):
     differ: list[Differing]
 
 
-class AuditedKind(TypedDict):
-    """How often a kind of disagreement occurs that is settled in this way."""
-
-    kind: str
-    settled: str
-    number: int
-
-
-class AuditedSight(TypedDict):
-    """How many robots have this verdict, at generic dimensions with all legs watched, and need at least so many legs to
-    show as much as all."""
-
-    verdict: str
-    fewest: int
-    number: int
-
-
-class AuditedGroup(TypedDict):
-    """A group of published robots: how many were compared, and how many move as stated or further; how many of the
-    stated losses of rank, and of the stated numbers of working choices of motors, agree."""
-
-    group: str
-    robots: int
-    without_chain: int
-    moves_as_stated: int
-    moves_further: int
-    not_found: int
-    choices: int
-    choices_agree: int
-    choices_agree_in_stated: int
-    choices_not_stated: int
-    choices_not_compared: int
-    counts: int
-    counts_agree: int
-    watching: list[AuditedSight]
-    kinds: list[AuditedKind]
-
-
-class TableDisagreementRecord(TypedDict):
-    """A figure of a table that differs from what is computed, with its file and line, its kind and what settles it."""
-
-    robot: str
-    group: str
-    at: str
-    kind: str
-    theirs: str
-    ours: str
-    settled: str
-
-
-class NoLegChain(TypedDict):
-    """A robot whose leg chain is in no table."""
-
-    group: str
-    robot: str
-    chain: str
-
-
-class CatalogAudit(Head):
-    """Published tables compared: `rows` of them, `compared` ones, those that `agree` with everything that is stated;
-    `kinds` and `settlements` in words; `file` has the records with their instances modulo primes."""
-
-    folder: str
-    rows: int
-    compared: int
-    agree: int
-    groups: list[AuditedGroup]
-    kinds: dict[str, str]
-    settlements: dict[str, str]
-    disagreements: list[TableDisagreementRecord]
-    defects: list[str]
-    without_chain: list[NoLegChain]
-    file: str | None
-
-
 class FindingRecord(TypedDict):
     """What a rule found; `line` is null if it concerns the whole file, `fix` says what to do about it, and `mends`
     whether --fix does so."""
@@ -1538,6 +1463,5 @@ RECORDS: dict[str, Any] = dict.fromkeys(("derive", "legs", "check", "modes", "at
     "catalog list": CatalogList,
     "catalog show": CatalogShow,
     "catalog site": CatalogSite,
-    "catalog audit": CatalogAudit,
 }
 """The type of each command's record."""

@@ -16,10 +16,10 @@ from scipy.optimize import least_squares
 
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.description import load, shipped
-from hrsynth.families.printed import CLAIMS, GOAL, PrintedClaim, PrintedMode, printed_poses
 from hrsynth.geometry.vectors import Array
-from hrsynth.present import printed as table
-from hrsynth.present.markdown import block
+from tables import printed as table
+from tables.markdown import block
+from tables.printed_claims import CLAIMS, GOAL, PrintedClaim, PrintedMode, printed_poses
 
 PAGE = (Path(__file__).resolve().parents[3] / "docs" / "pages" / "papers.md").read_text(encoding="utf-8")
 L1, L2 = 0.380, 0.825

@@ -1,0 +1,1 @@
+"""Tables of pages that the program writes."""

@@ -1,0 +1,27 @@
+"""The table of the catalog, on the page docs/pages/catalog.md."""
+
+from __future__ import annotations
+
+from hrsynth.analysis.verdict import BLIND, CONTROLLABLE, PARTIAL
+from hrsynth.catalog.query import Catalog, load
+from hrsynth.catalog.store import shipped_folder
+from hrsynth.catalog.words import SENSORS
+
+from .markdown import table as markdown
+
+START = "<!-- generated: catalog -->"
+VERDICTS = (CONTROLLABLE, PARTIAL, BLIND, None)
+HEADS = ("group", "architectures", "controllable", "partially controllable", "uncontrollable", "refused")
+
+
+def table(catalog: Catalog | None = None) -> str:
+    """The Markdown table of how many architectures of each group have which verdict (default: of what is shipped)."""
+    if catalog is None:
+        catalog = Catalog((*load(), *load(group=SENSORS))) if shipped_folder().groups() else Catalog(())
+    rows = [_row(str(group), catalog.where(group=group)) for (group,) in catalog.count("group")]
+    return markdown(HEADS, [*rows, _row("all", catalog)], 1)
+
+
+def _row(name: str, catalog: Catalog) -> list[str]:
+    counts = catalog.count("verdict")
+    return [name, f"{len(catalog):,}", *(f"{counts.get((verdict,), 0):,}" for verdict in VERDICTS)]

@@ -1,0 +1,219 @@
+"""What the catalog says, as tables and as rules that need no computation, on the page docs/pages/catalog_says.md."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from hrsynth.analysis.verdict import BLIND, CONTROLLABLE, PARTIAL
+from hrsynth.catalog.groups.spatial import translates
+from hrsynth.catalog.query import Catalog
+from hrsynth.catalog.words import LegWord, RobotWord, parse
+
+from .markdown import replace_between, table
+
+PAGE = Path(__file__).resolve().parents[1] / "pages" / "catalog_says.md"
+VERDICTS = (CONTROLLABLE, PARTIAL, BLIND)
+INFINITY, RAIL, GENERAL = "line at infinity", "line across the rails", "line in general position"
+Record = Mapping[str, Any]
+
+
+def mark(leg: LegWord) -> int:
+    """The joint after which the observed link of a leg follows."""
+    if leg.observed is not None:
+        return leg.observed
+    slides = [i for i in range(1, len(leg.joints) - 1) if leg.joints[i].letter == "P"]
+    last = len(leg.joints) - (1 if leg.joints[-1].letter in ("Pi", "2SS", "2US") else 2)
+    before = slides[0] - 1 if slides else last
+    while slides and before + 2 < len(leg.joints) and leg.joints[before + 1].letter == "P":
+        before += 1
+    return before
+
+
+def centres(leg: LegWord, end: int = 0) -> str | None:
+    """Where the platform's instantaneous centre can be while the observed direction of a planar leg is held; None where
+    that is anywhere. ``end``: how many joints at the platform are left out."""
+    last, joints = mark(leg), leg.joints[: len(leg.joints) - end]
+    turning = [
+        i for i, joint in enumerate(joints[: last + 1]) if joint.letter == "R" or (joint.letter == "Pi" and i == last)
+    ]
+    if not turning:
+        return None
+    rest = [joint for i, joint in enumerate(joints) if i not in turning]
+    # of k joints that turn the link, k - 1 freedoms are left: two R shift what follows, an R and a Pi turn it too
+    turned = sum(joint.letter == "R" for joint in rest) + (joints[last].letter == "Pi" and len(turning) > 1)
+    if len(rest) + len(turning) - 1 - turned == 2:
+        return INFINITY
+    return RAIL if [(joint.letter, joint.axes) for joint in rest if joint.letter != "R"] == [("P", "x")] else GENERAL
+
+
+def planar_rank(word: RobotWord) -> int:
+    """What the legs of a planar robot see: the rank of their lines of centres; of a point, of the ways left to it.
+    Rails that are parallel are all along x."""
+    point = word.platform == "point"
+    found = Counter(centres(leg, 1 if point else 0) for leg in word.legs)
+    if point:
+        return min(2, (found[RAIL] > 0) + found[GENERAL])
+    return min(3, min(2, (found[INFINITY] > 0) + found[RAIL]) + found[GENERAL])
+
+
+def delta_controllable(word: RobotWord, dof: int) -> bool:
+    """Whether deltas of these legs are controllable: their slides are not all parallel, and the legs are enough."""
+    first = {leg.unmoved.joints[0] for leg in word.legs}
+    parallel = len({joint.axes for joint in first}) == 1 and all(
+        joint.letter == "P" and joint.axes in ("x", "y", "z") for joint in first
+    )
+    return not parallel and 2 * len(word.legs) >= dof
+
+
+def translating(word: RobotWord) -> bool:
+    """Whether a word is of legs that translate (:func:`hrsynth.catalog.groups.spatial.translates`) and of no others."""
+    joints = [joint for leg in word.legs for joint in leg.joints]
+    return all(joint.letter in "RP" and joint.axes in "abhjk" for joint in joints) and all(
+        translates(leg.chain) for leg in word.legs
+    )
+
+
+def split(leg: LegWord, place: int) -> int:
+    """Of how many directions of R some, but not all, come before a place in a leg."""
+    axes = [joint.axes if joint.letter == "R" else "" for joint in leg.joints]
+    return sum(0 < axes[:place].count(axis) < axes.count(axis) for axis in set(axes) - {""})
+
+
+def translation_rank(word: RobotWord) -> int:
+    """What legs that translate see: each the directions of R on both sides of the watched link, all together at most
+    three. Slides of the catalog are normal to z: legs with two that never turn see z, and so does a leg with one that
+    tells two numbers, which are all that is normal to it."""
+    seen, along, known = 0, 0, False
+    for leg in word.legs:
+        numbers = split(leg, mark(leg) + 1)
+        steady = [i for i, joint in enumerate(leg.joints) if joint.letter == "P" and not split(leg, i)]
+        if len(steady) == 2:
+            along = max(along, numbers)
+        else:
+            seen += numbers
+            known |= len(steady) == 1 and numbers == 2
+    return min(3, seen + (0 if known else along))
+
+
+def studied(catalog: Catalog) -> list[Record]:
+    """The records that have a verdict."""
+    return [each for each in catalog if not each.get("refused")]
+
+
+def motions(catalog: Catalog) -> str:
+    """Verdicts by kind of motion."""
+    by: dict[str, Counter[str]] = {}
+    for each in studied(catalog):
+        by.setdefault(each["motion"], Counter())[each["verdict"]] += 1
+    rows = [
+        (motion, f"{sum(found.values()):,}", *(f"{found[v]:,}" for v in VERDICTS), share(found))
+        for motion, found in sorted(by.items(), key=lambda item: -sum(item[1].values()))
+    ]
+    return table(("motion", "architectures", *VERDICTS, "controllable (%)"), rows, 1)
+
+
+def numbers(record: Record) -> int:
+    """How many legs must be watched at least: a direction is two numbers, in a plane one."""
+    return int(record["dof"]) if record["group"] == "planar" else math.ceil(record["dof"] / 2)
+
+
+def fewest(catalog: Catalog) -> str:
+    """How many controllable architectures need as many legs as numbers ask for, and how many need more."""
+    by: dict[tuple[str, str, int], Counter[int]] = {}
+    for each in studied(catalog):
+        if each["verdict"] == CONTROLLABLE:
+            least = numbers(each)
+            by.setdefault((each["motion"], each["group"], least), Counter())[each["fewest"] - least] += 1
+    rows = [
+        (motion, group, least, *(f"{found[k]:,}" if found[k] else "–" for k in range(4)))
+        for (motion, group, least), found in sorted(by.items())
+    ]
+    return table(("motion", "group", "at least", "so many", "one more", "two more", "three more"), rows, 1)
+
+
+def chains(catalog: Catalog) -> str:
+    """Verdicts of robots with equal legs, by the letters of the leg."""
+    by: dict[tuple[str, str], Counter[str]] = {}
+    for each in studied(catalog):
+        word = parse(each["word"])
+        letters = {"".join(joint.letter for joint in leg.joints) for leg in word.legs}
+        if len(letters) == 1:
+            by.setdefault((each["group"], *letters), Counter())[each["verdict"]] += 1
+    rows = [
+        (group, f"`{chain}`", *(f"{found[v]:,}" if found[v] else "–" for v in VERDICTS), share(found))
+        for (group, chain), found in sorted(by.items())
+    ]
+    return table(("group", "legs", *VERDICTS, "controllable (%)"), rows, 1)
+
+
+def cures(catalog: Catalog) -> str:
+    """How many further measurements the others need."""
+    found: Counter[str] = Counter()
+    for each in studied(catalog):
+        if each["verdict"] != CONTROLLABLE:
+            text = each["cure"]
+            known = not text.startswith(("none", "not all"))
+            found[str(text.count(" and ") + 1) if known else "none of up to four was found"] += 1
+    return table(("further measurements", "architectures"), [(key, f"{n:,}") for key, n in sorted(found.items())], 1)
+
+
+def rules(catalog: Catalog) -> str:
+    """How many records agree with each rule."""
+
+    def agree(records: Iterable[bool]) -> str:
+        truth = list(records)
+        return f"{sum(truth):,} of {len(truth):,}"
+
+    every = studied(catalog)
+    rows = [
+        (
+            "planar: rank of the lines of centres",
+            agree(planar_rank(parse(each["word"])) == each["rank"] for each in every if each["group"] == "planar"),
+        ),
+        (
+            "deltas: slides not all parallel, enough legs",
+            agree(
+                delta_controllable(parse(each["word"]), each["dof"]) == (each["verdict"] == CONTROLLABLE)
+                for each in every
+                if each["group"] == "deltas"
+            ),
+        ),
+        (
+            "legs that translate: directions of R on both sides of the watched link",
+            agree(
+                translation_rank(word) == each["rank"]
+                for each in every
+                if each["group"] in ("mixed", "spatial")
+                if translating(word := parse(each["word"]))
+            ),
+        ),
+        (
+            "at least dof/2 legs, in a plane dof",
+            agree(each["fewest"] >= numbers(each) for each in every if each["verdict"] == CONTROLLABLE),
+        ),
+    ]
+    return table(("rule", "agree"), rows, 1)
+
+
+TABLES = {"motions": motions, "fewest": fewest, "chains": chains, "cures": cures, "rules": rules}
+
+
+def start(name: str) -> str:
+    """The mark before a table."""
+    return f"<!-- generated: {name} -->"
+
+
+def written(text: str, catalog: Catalog, tables: Mapping[str, Callable[[Catalog], str]] = TABLES) -> str:
+    """A page with its tables."""
+    for name, made in tables.items():
+        text = replace_between(text, made(catalog), start(name))
+    return text
+
+
+def share(found: Counter[str]) -> str:
+    """How many of hundred are controllable."""
+    return f"{100 * found[CONTROLLABLE] / sum(found.values()):.0f}"

@@ -1,0 +1,19 @@
+"""The table of the rules of ``lint``, on the page docs/pages/lint.md."""
+
+from __future__ import annotations
+
+from hrsynth.linting.rules import lint_rules
+
+from .markdown import table as markdown
+
+START = "<!-- generated: rules -->"
+
+
+def table() -> str:
+    """The Markdown table of all rules, as they say it themselves."""
+    rows = []
+    for rule in lint_rules().values():
+        advice = f"{rule.advice} (`--fix`)" if rule.mends else rule.advice
+        cells = (f"`{rule.name}`", rule.severity, rule.title, rule.explanation, advice)
+        rows.append([each.replace("<", "&lt;") for each in cells])
+    return markdown(("rule", "severity", "what it finds", "why it matters", "what to do"), rows)

@@ -1,0 +1,51 @@
+"""The table of all kinds of observations, on the page docs/pages/observations.md."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hrsynth.geometry.vectors import frozen, unit
+from hrsynth.mechanism.notation import Letter, Word
+from hrsynth.mechanism.observations import kinds
+from hrsynth.mechanism.sights import Sighting
+
+from .markdown import table as markdown
+
+START = "<!-- generated: kinds -->"
+AT = Sighting(np.zeros(3), np.array([0, 0, 1.0]), np.array([0.3, 0.2, 1.0]), unit((1, 2, 0.5)))
+"""Where a camera and a link may be: the words of chains do not depend on it."""
+
+
+def table() -> str:
+    """The Markdown table of all kinds, as they say it themselves."""
+    rows = []
+    for word, kind in kinds().items():
+        needs = ", ".join(f"`{name.rstrip('?')}`{' (optional)' * name.endswith('?')}" for name in kind.needs)
+        rows.append(
+            (
+                f"`{word}`",
+                kind.words,
+                needs,
+                kind.rank,
+                chain_word(word),
+                kind.locked,  # type: ignore[attr-defined]
+                kind.fed_back,
+            )
+        )
+    return markdown(
+        ("kind", "measured", "attributes", "numbers", "virtual chain", "held, it transmits", "error in a servo loop"),
+        rows,
+    )
+
+
+def chain_word(word: str) -> str:
+    """The word of a kind's virtual chain, its motors underlined."""
+    kind = kinds()[word]
+    if "joint" in kind.needs:
+        return "the real joint, actuated"
+    if "at" in kind.needs:
+        axis = frozen((0, 0, 1)) if "axis" in kind.needs else None
+        seen = kind("", "", axis=axis, radius=0.1 if "radius" in kind.needs else None)  # type: ignore[call-arg]
+    else:
+        seen = kind("", "", direction=frozen((0, 0, 1)))  # type: ignore[call-arg]
+    return str(Word(tuple(Letter(joint.letter, joint.actuated) for joint in seen.chain(AT))))  # type: ignore[attr-defined]

@@ -1,0 +1,87 @@
+"""The tables of forms and of assembly modes that the papers print, beside those that are computed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import cache
+
+from hrsynth.analysis.derive import derive
+from hrsynth.analysis.modes.assembly_mode import AssemblyMode
+from hrsynth.analysis.modes.modes import AssemblyModes, modes
+from hrsynth.description import load, shipped
+
+from .markdown import table as markdown
+from .printed_claims import CLAIMS, FORMS, Place, PrintedClaim, PrintedForm
+
+START = "<!-- generated: printed modes -->"
+HEADS = ("source", "robot", "legs", "printed x, y, z (φ = 0)", "computed x, y, z; φ", "apart", "word")
+
+FORMS_START = "<!-- generated: printed forms -->"
+FORMS_HEADS = ("source", "real", "hidden, as printed", "robot", "legs", "derived", "as printed?")
+
+
+def forms_table() -> str:
+    """The Markdown table of printed forms, each with the hidden robot that is derived."""
+    return markdown(FORMS_HEADS, map(form_row, FORMS))
+
+
+def form_row(form: PrintedForm) -> tuple[str, ...]:
+    """One printed form's row."""
+    found = str(derive(load(shipped()[form.robot]), form.legs, unchecked=False).hidden_architecture)
+    same = any(found in (each, f"{found.partition('-')[0]}-{each}") for each in form.hidden)
+    return (
+        form.source,
+        form.real,
+        " or ".join(form.hidden),
+        f"`{form.robot}`",
+        ", ".join(form.legs) if form.legs else "all",
+        found,
+        "yes" if same else "no",
+    )
+
+
+@cache
+def compute_modes(claim: PrintedClaim) -> AssemblyModes:
+    """All modes with the directions that the claim's legs have at its desired pose."""
+    return modes(load(shipped()[claim.robot]), claim.legs, at=claim.at)
+
+
+def nearest(place: Place, found: AssemblyModes) -> AssemblyMode:
+    """The mode whose place is nearest to a printed one."""
+    return min(found.modes, key=lambda mode: math.dist(place, _place(mode)))
+
+
+def table() -> str:
+    """The Markdown table of all claims: each printed pose with the nearest mode, then the modes not printed."""
+    return markdown(HEADS, (row for claim in CLAIMS for row in _rows(claim)))
+
+
+def _rows(claim: PrintedClaim) -> Iterator[tuple[str, ...]]:
+    found = compute_modes(claim)
+    head = (claim.source, f"`{claim.robot}`", ", ".join(claim.legs))
+    met = []
+    for each in claim.modes:
+        mode = nearest(each.place, found)
+        met.append(mode)
+        apart = 1e3 * math.dist(each.place, _place(mode))
+        yield (*head, ", ".join(f"{v:g}" for v in each.place), _write_place(mode), f"{apart:.0f} mm", each.remark)
+    for mode in found.modes:
+        if mode not in met:
+            reached = f"; legs {', '.join(mode.open)} do not reach it" if mode.reachable is False else ""
+            yield (*head, "–", _write_place(mode), "–", f"not printed{reached}")
+
+
+def _place(mode: AssemblyMode) -> Place:
+    pose = mode.pose
+    assert pose.x is not None
+    assert pose.y is not None
+    assert pose.z is not None
+    return pose.x, pose.y, pose.z
+
+
+def _write_place(mode: AssemblyMode) -> str:
+    """A place to a tenth of a millimetre and the turn about z to a degree."""
+    assert mode.pose.rpy is not None
+    turn = round(math.degrees(mode.pose.rpy[2])) % 360
+    return f"{', '.join(f'{round(v, 4) + 0.0:.4f}' for v in _place(mode))}; {turn}°"

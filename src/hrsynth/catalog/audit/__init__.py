@@ -1,1 +1,0 @@
-"""The tables of others compared with what is computed here."""

@@ -1,0 +1,1 @@
+"""The tables of others compared with what is computed here; README.md says how."""
