@@ -26,7 +26,7 @@ PACKAGE = ROOT / "src" / "hrsynth"
 
 # A module imports only from its own folder and from those above it here.
 FOLDERS = [
-    {"errors", "tolerances", "budgets", "ranges", "results", "processes", "progress", "records"}
+    {"errors", "tolerances", "budgets", "options", "results", "processes", "progress", "records"}
     | {"characters", "untrusted", "version"},
     {"geometry"},
     {"mechanism"},

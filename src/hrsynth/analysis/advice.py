@@ -19,8 +19,8 @@ from ..kinematics.sampling import Samples
 from ..mechanism import Direction, Joint, JointType, Mechanism, Observation
 from ..mechanism.observations import kinds
 from ..mechanism.sensors import encoders, observation_of, observed_line
+from ..options import plain_number
 from ..progress import tell
-from ..ranges import plain_number
 from ..records import FLAT, GAP, OPTIONAL, As, Shown, Word, recorded
 from ..results import Result, Value
 from ..tolerances import RANK_CUTOFF, SAME_PRICE, SAME_RELATION

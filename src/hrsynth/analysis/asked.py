@@ -12,7 +12,7 @@ from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.locked import rezero
 from ..mechanism.model import Mechanism
 from ..mechanism.pose import ModeNumber, Pose, PoseLike, asked_pose
-from ..ranges import require_range
+from ..options import require_range
 from ..results import with_spelling
 from ..tolerances import AS_PRINTED
 from .observed import SAMPLES, CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike, as_robot

@@ -16,7 +16,7 @@ import numpy as np
 from ..budgets import REMEMBERED_ANSWERS, REMEMBERED_GRIDS
 from ..errors import BadRequest, MissingExtra
 from ..mechanism import Mechanism
-from ..ranges import require_range
+from ..options import require_range
 from ..results import content, require_keywords
 from .observed import as_robot, forget_robots, legs_asked
 

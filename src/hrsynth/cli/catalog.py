@@ -18,10 +18,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 
+from ..options import NEEDED, Option, flag, output
 from ..records import Head, Word
 from .colour import say
 from .commands import Group, add_command
-from .options import JSON, NEEDED, Option, flag, output, warn
+from .options import JSON, warn
 from .progress import Progress
 
 if TYPE_CHECKING:

@@ -10,8 +10,9 @@ from itertools import takewhile
 from typing import Any
 
 from ..errors import BadRequest
+from ..options import NEEDED, OUTPUT, OWN, READING, WATCHING, Option
 from .colour import paint_help, say
-from .options import NEEDED, OUTPUT, OWN, READING, WATCHING, Option, warn
+from .options import warn
 
 HELP = ("-h", "--help")
 HELP_ROW = (", ".join(HELP), "Show this message and exit.")

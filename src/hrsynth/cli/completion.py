@@ -6,9 +6,10 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from typing import Any
 
+from ..options import NEEDED, Option
 from .colour import say
 from .commands import Group, add_command
-from .options import NEEDED, Option, shipped_names
+from .options import shipped_names
 
 EXAMPLE = "example:"
 WORDS = "words"

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Any, NotRequired, TypedDict
 
+from ..options import NEEDED, OUTPUT, Option, flag, output
 from ..records import Head, OfRobot, Platform
 from . import options
 from .colour import say
 from .commands import Group, add_command
-from .options import JSON, NEEDED, OUTPUT, SOURCE, Option, flag, output, robot_of, warn
+from .options import JSON, SOURCE, robot_of, warn
 from .progress import Progress
 
 

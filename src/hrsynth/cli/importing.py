@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..characters import escape_steering
+from ..options import NEEDED, WATCHING, Option, flag, output
 from ..records import OfRobot
 from .colour import say
 from .commands import Group, add_command
-from .options import JSON, NEEDED, SOURCE, WATCHING, Option, flag, output, quiet_robot_of, robot_of, warn
+from .options import JSON, SOURCE, quiet_robot_of, robot_of, warn
 from .progress import Progress
 
 if TYPE_CHECKING:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+from ..options import NEEDED, OUTPUT, Option, flag, output
 from .colour import paint, say
 from .commands import Group, add_command
-from .options import JSON, NEEDED, OUTPUT, SOURCE, Option, flag, output, shipped_names
+from .options import JSON, SOURCE, shipped_names
 from .progress import Progress
 
 FORMATS = ("text", "github", "sarif", "json")

@@ -1,109 +1,17 @@
-"""Options as data: each is declared once, the commands' tables put them together; the command line is read
-by them, the help and the completion of shells are made of them."""
+"""The options of the command line that belong to no question of their own, and what is told of others."""
 
 from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from ..ranges import in_range, plain_number, range_of, range_words
+from ..options import NEEDED, OUTPUT, READING, Option, flag
 from .colour import say
 
 if TYPE_CHECKING:
     from ..mechanism import Mechanism
-
-NEEDED: Any = ...
-"""The default of what must be given."""
-OWN, WATCHING, OUTPUT, READING = "Options", "What is watched", "Output", "What the file does not say"
-"""Groups of options, in the order of the help."""
-
-
-@dataclass(frozen=True)
-class Option:
-    """One option or (``argument``) one word of the command line; ``flags`` are its names, by default its own; ``old``
-    ones are taken too, and told. ``words`` are what its value can be, where that can be told."""
-
-    name: str
-    help: str
-    metavar: str | None = None
-    kind: Any = str
-    default: Any = None
-    flags: tuple[str, ...] = ()
-    low: float | None = None
-    high: float | None = None
-    argument: bool = False
-    group: str = OWN
-    words: Callable[[], Iterable[str]] | tuple[str, ...] = ()
-    old: tuple[str, ...] = ()
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Its names on the command line: none of an argument, ``--open/--no-open`` of a flag that can be denied."""
-        return () if self.argument else self.flags or (f"--{self.name.replace('_', '-')}",)
-
-    @property
-    def value(self) -> str:
-        """How the help calls what is given."""
-        return self.metavar or {int: "COUNT", float: "NUMBER"}.get(self.kind, self.name.upper())
-
-    @property
-    def shown(self) -> str:
-        """How the help names it."""
-        names = ", ".join(self.names).replace("/", " / ")
-        return f"{names} {'' if self.kind is bool else self.value}".strip()
-
-    @property
-    def told(self) -> str:
-        """What the help says of it: what it is for, its default, its range."""
-        given = not isinstance(self.default, bool) and self.default not in (NEEDED, None, "")
-        facts = [f"default: {self.default}"] if given else ["required"] if self.default is NEEDED else []
-        facts += [] if self.low is None else [f"at least {self.low}"]
-        facts += [] if self.high is None else [f"at most {self.high}"]
-        return f"{self.help}  [{'; '.join(facts)}]" if facts else self.help
-
-    @property
-    def several(self) -> bool:
-        """Whether it can be given more than once."""
-        return self.kind == list[str]
-
-    @property
-    def names_several(self) -> bool:
-        """Whether one value names several things, so that a second value would not be taken for the only one."""
-        return self.metavar in ("LEGS", "LINKS", "JOINTS")
-
-    def ranged(self, question: str) -> Option:
-        """The same with the range that a question has for it."""
-        low, high = range_of(question, self.name)
-        return replace(self, low=self.low if low is None else low, high=self.high if high is None else high)
-
-    def read(self, text: str) -> Any:
-        """A value as it is written on the command line; raises ``BadRequest``."""
-        from ..errors import BadRequest
-
-        if self.kind not in (int, float):
-            return text
-        try:
-            number = plain_number(text, self.kind)
-            if in_range(number, self.low, self.high):
-                return number
-        except ValueError:
-            pass
-        name = self.names[0] if self.names else self.value
-        word = "an integer" if self.kind is int else "a number"
-        raise BadRequest(name, text, ", ".join([word, *range_words(self.low, self.high)])) from None
-
-
-def flag(name: str, help: str, group: str = OWN) -> Option:
-    """An option that is given or not."""
-    return Option(name, help, kind=bool, default=False, group=group)
-
-
-def output(help: str, metavar: str = "FILE", default: Any = None) -> Option:
-    """What is written with ``-o``."""
-    return Option("output", help, metavar, default=default, flags=("-o", "--output"), group=OUTPUT)
 
 
 def shipped_names() -> Iterable[str]:
@@ -114,39 +22,6 @@ def shipped_names() -> Iterable[str]:
 
 
 JSON = flag("json", "Print the result as one JSON object; its schema: hrsynth schema COMMAND.", OUTPUT)
-OBSERVE = Option(
-    "observe",
-    "Legs to watch (1,4), links, or all (default: what the file observes, else all; none with --see).",
-    "LEGS",
-    group=WATCHING,
-)
-CAMERA = Option(
-    "camera",
-    "The link that carries the camera; or a further camera with a name and its place on a link "
-    "(metres; radians or deg; focal length, width and height in pixels); repeat for more.",
-    "LINK|NAME=LINK@x,y,z/r,p,y/f,w,h",
-    list[str],
-    group=WATCHING,
-)
-WATCHED = (OBSERVE, CAMERA)
-SEE = Option(
-    "see",
-    "What else is observed: circle, depth, direction, distance, edge, edges, encoder, image_circle, "
-    "image_line, inclination, line, point or position, with a point, an axis and a radius where the kind "
-    "needs them (world: the base; for an encoder, its joint); repeat for more.",
-    "[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius",
-    list[str],
-    group=WATCHING,
-)
-OFFER = Option(
-    "offer",
-    "What could be observed in addition, written as for --see; without a place, such as "
-    "point:plate, several places of that link; separate more by commas, or repeat.",
-    "[CAMERA=]KIND:LINK[@x,y,z/dx,dy,dz/radius]",
-    list[str],
-    group=WATCHING,
-)
-SEED = Option("seed", "Seed of the random configurations.", "NUMBER", int, 0)
 SOURCE = (
     Option(
         "robot",

@@ -8,29 +8,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..budgets import BRANCH_CELLS, COVER_BOXES, EFFORT
+from ..options import NEEDED, OUTPUT, Option, flag, output
 from ..present.outputs import OUTPUTS
 from ..progress import following
 from ..tolerances import MEASUREMENT_BOUND
 from .colour import paint, say
 from .commands import Group, add_command
-from .options import (
-    JSON,
-    NEEDED,
-    OFFER,
-    OUTPUT,
-    SEE,
-    SEED,
-    SOURCE,
-    WATCHED,
-    Option,
-    flag,
-    output,
-    robot_of,
-    split_names,
-    told_radians,
-    told_turns,
-    warn,
-)
+from .options import JSON, OFFER, SEE, SEED, SOURCE, WATCHED, robot_of, split_names, told_radians, told_turns, warn
 from .progress import Progress
 from .studio import PORT, serve
 

@@ -11,11 +11,11 @@ from typing import Any
 import hrsynth
 
 from .. import records
+from ..options import NEEDED, Option
 from ..present.outputs import OUTPUTS, File, function
 from ..records import Head, OfRobot, object_schema
 from .colour import say
 from .commands import DeclaredCommand, Group, add_command
-from .options import NEEDED, Option
 
 INTRODUCTION = """What every command prints with `--json`: one object. `hrsynth schema COMMAND` prints its JSON
 schema, and this page shows all of them. They are made of what each result says of its values.

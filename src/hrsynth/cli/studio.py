@@ -6,9 +6,10 @@ import signal
 import threading
 from typing import TYPE_CHECKING, Any
 
+from ..options import WATCHING, Option
 from .colour import say
 from .commands import Group, add_command
-from .options import WATCHING, Option, shipped_names, split_names
+from .options import shipped_names, split_names
 
 if TYPE_CHECKING:
     from ..present.studio.server import StudioServer

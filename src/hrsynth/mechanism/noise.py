@@ -11,7 +11,7 @@ import numpy as np
 from ..budgets import WIDEST_NOISE
 from ..errors import BadRequest
 from ..geometry.vectors import Array
-from ..ranges import plain_number
+from ..options import plain_number
 from ..tolerances import NOISE_STEP
 from .observation import Observation
 from .sights import CameraObservation

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..budgets import FARTHEST_POSE, LARGEST_GRID
 from ..errors import BadRequest
 from ..geometry.vectors import Array, rotation_from_rpy
-from ..ranges import plain_number
+from ..options import plain_number
 from ..records import FLAT, As, Record, recorded
 from ..results import Value
 from ..tolerances import AS_PRINTED, HALF_TURN

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..characters import name_steering
 from ..errors import BadRequest, MissingExtra
-from ..ranges import require_range
+from ..options import require_range
 from ..results import Result, with_spelling
 from ..version import __version__
 from .outputs import FIGURES, OUTPUTS, File, function

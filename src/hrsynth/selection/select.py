@@ -32,8 +32,8 @@ from ..mechanism.noise import Noise
 from ..mechanism.observation import labels_of
 from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.pose import Pose, PoseLike, asked_pose
+from ..options import require_range
 from ..progress import part, tell
-from ..ranges import require_range
 from ..results import Compared, Result, Value, by_name
 from ..simulation.camera import cylinders, place_camera
 from ..simulation.ending import GOAL

@@ -27,7 +27,7 @@ from ..kinematics.relation import Measurement
 from ..kinematics.steps import lead_to
 from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.sights import CameraObservation, depth_plane
-from ..ranges import plain_number
+from ..options import plain_number
 from ..results import Value
 from ..tolerances import DAMPED
 

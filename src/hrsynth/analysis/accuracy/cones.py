@@ -22,7 +22,7 @@ from ...kinematics.relation import Measurement
 from ...mechanism import Observation
 from ...mechanism.noise import Noise, blurs
 from ...mechanism.observations.direction import SeenAxis
-from ...ranges import plain_number
+from ...options import plain_number
 from ...results import Value
 from ...tolerances import NARROWEST_CONE, SEEN_ABOVE
 

@@ -21,7 +21,7 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.relation import Measurement, platform_motions, relation
 from ...kinematics.tasks import Held, shorten_step, solve
-from ...ranges import plain_number
+from ...options import plain_number
 from ...records import As
 from ...results import Value
 from ...tolerances import CURVATURE_STEP, FAMILY_STEP, SAME_GEOMETRY, SAME_NEAR_POSE, SOLVED, SURELY_SOMETHING

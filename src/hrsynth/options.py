@@ -1,0 +1,157 @@
+"""What can be asked: options as data, each declared once.
+
+Where a public function takes one, it stands in its annotation (:func:`option`); name, kind and default are those of the
+parameter. The command line, its help and completion, and what Python checks follow from that.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from inspect import Parameter, signature
+from types import NoneType, SimpleNamespace
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
+
+from .errors import BadRequest
+
+NEEDED: Any = ...
+"""The default of what must be given."""
+OWN, WATCHING, OUTPUT, READING = "Options", "What is watched", "Output", "What the file does not say"
+"""Groups of options, in the order of the help."""
+
+
+@dataclass(frozen=True)
+class Option:
+    """One option or (``argument``) one word of the command line; ``flags`` are its names, by default its own; ``old``
+    ones are taken too, and told. ``words`` are what its value can be, where that can be told."""
+
+    name: str
+    help: str
+    metavar: str | None = None
+    kind: Any = str
+    default: Any = None
+    flags: tuple[str, ...] = ()
+    low: float | None = None
+    high: float | None = None
+    argument: bool = False
+    group: str = OWN
+    words: Callable[[], Iterable[str]] | tuple[str, ...] = ()
+    old: tuple[str, ...] = ()
+    deprecated: str = ""
+    """Why it should not be given any more, and what to do instead."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Its names on the command line: none of an argument, ``--open/--no-open`` of a flag that can be denied."""
+        return () if self.argument else self.flags or (f"--{self.name.replace('_', '-')}",)
+
+    @property
+    def value(self) -> str:
+        """How the help calls what is given."""
+        return self.metavar or {int: "COUNT", float: "NUMBER"}.get(self.kind, self.name.upper())
+
+    @property
+    def shown(self) -> str:
+        """How the help names it."""
+        names = ", ".join(self.names).replace("/", " / ")
+        return f"{names} {'' if self.kind is bool else self.value}".strip()
+
+    @property
+    def told(self) -> str:
+        """What the help says of it: what it is for, its default, its range."""
+        given = not isinstance(self.default, bool) and self.default not in (NEEDED, None, "")
+        facts = [f"default: {self.default}"] if given else ["required"] if self.default is NEEDED else []
+        facts += [] if self.low is None else [f"at least {self.low}"]
+        facts += [] if self.high is None else [f"at most {self.high}"]
+        return f"{self.help}  [{'; '.join(facts)}]" if facts else self.help
+
+    @property
+    def several(self) -> bool:
+        """Whether it can be given more than once."""
+        return self.kind == list[str]
+
+    @property
+    def names_several(self) -> bool:
+        """Whether one value names several things, so that a second value would not be taken for the only one."""
+        return self.metavar in ("LEGS", "LINKS", "JOINTS")
+
+    def read(self, text: str) -> Any:
+        """A value as it is written on the command line; raises ``BadRequest``."""
+        if self.kind not in (int, float):
+            return text
+        try:
+            number = plain_number(text, self.kind)
+            if in_range(number, self.low, self.high):
+                return number
+        except ValueError:
+            pass
+        name = self.names[0] if self.names else self.value
+        word = "an integer" if self.kind is int else "a number"
+        raise BadRequest(name, text, ", ".join([word, *range_words(self.low, self.high)])) from None
+
+
+def flag(name: str, help: str, group: str = OWN) -> Option:
+    """An option that is given or not."""
+    return Option(name, help, kind=bool, default=False, group=group)
+
+
+def output(help: str, metavar: str = "FILE", default: Any = None) -> Option:
+    """What is written with ``-o``."""
+    return Option("output", help, metavar, default=default, flags=("-o", "--output"), group=OUTPUT)
+
+
+def option(help: str, metavar: str | None = None, **more: Any) -> Option:
+    """An option of the parameter that it annotates."""
+    return Option("", help, metavar, **more)
+
+
+def options_of(function: Callable[..., Any]) -> Iterator[Option]:
+    """The options of a function's parameters, or of a dataclass's fields, in their order."""
+    place = vars(sys.modules[function.__module__])
+    for name, parameter in signature(function).parameters.items():
+        hint, *extras = _annotated(parameter.annotation, place)
+        for each in extras:
+            if isinstance(each, Option):
+                default = NEEDED if parameter.default is Parameter.empty else parameter.default
+                kind = _kind(hint) if each.kind is str else each.kind
+                yield replace(each, name=name, kind=kind, default=None if default == () else default)
+
+
+def _annotated(annotation: Any, place: dict[str, Any]) -> tuple[Any, ...]:
+    """A type and what annotates it; what is annotated by a type alone is not looked at."""
+    if isinstance(annotation, str):
+        if not annotation.startswith("Annotated[") and get_origin(place.get(annotation)) is not Annotated:
+            return (annotation,)
+        found = SimpleNamespace(__annotations__={"it": annotation})
+        annotation = get_type_hints(found, place, include_extras=True)["it"]
+    return get_args(annotation) if get_origin(annotation) is Annotated else (annotation,)
+
+
+def _kind(hint: Any) -> Any:
+    """What is read for a type: a number or a flag for these, perhaps with None, otherwise a text."""
+    kinds = {each for each in get_args(hint) or (hint,) if each is not NoneType}
+    return kinds.pop() if kinds in ({bool}, {int}, {float}) else str
+
+
+def range_words(low: float | None, high: float | None) -> list[str]:
+    """A range in words."""
+    return [f"at {end} {value:g}" for end, value in (("least", low), ("most", high)) if value is not None]
+
+
+def in_range(value: float, low: float | None, high: float | None) -> bool:
+    """Whether a number is in a range; not a number is in none that has an end."""
+    return (low is None or value >= low) and (high is None or value <= high)
+
+
+def require_range(name: str, value: float, word: str, low: float | None, high: float | None = None) -> None:
+    """Raise ``BadRequest`` for a value that is not between two numbers."""
+    if not in_range(value, low, high):
+        raise BadRequest(name, value, ", ".join([word, *range_words(low, high)]))
+
+
+def plain_number(text: str, kind: type = float) -> Any:
+    """The number that a user writes, in ASCII digits without underscores; raises ``ValueError``."""
+    if not text.isascii() or "_" in text:
+        raise ValueError(text)
+    return kind(text)
