@@ -11,108 +11,11 @@
 An answer is one line at a prompt; ``print`` shows it in full, ``to_dict()`` is its JSON, ``hrsynth.draw`` its picture.
 """
 
-from typing import TYPE_CHECKING
-
+from .index import homes
 from .results import Result
-from .version import __version__
+from .version import __version__ as __version__
 
-if TYPE_CHECKING:
-    from . import catalog
-    from .analysis.accuracy.accuracy import accuracy
-    from .analysis.advice import advise
-    from .analysis.asked import observe
-    from .analysis.aspects.atlas import atlas
-    from .analysis.aspects.path import path
-    from .analysis.branch.proof import branch
-    from .analysis.check import check
-    from .analysis.controllability import legs
-    from .analysis.derive import derive
-    from .analysis.modes.modes import modes
-    from .analysis.question import forget
-    from .analysis.singularity.singular import singular
-    from .analysis.study import map
-    from .certificates import certificate, verify
-    from .codegen.export import export
-    from .description import examples, load, save, shipped
-    from .linting.lint import lint
-    from .present.show import draw, html, text
-    from .present.studio.server import studio
-    from .present.view.view import view
-    from .progress import following
-    from .selection.select import select
-    from .simulation.endings.basins import basins
-    from .simulation.endings.endings import endings
-    from .simulation.servo import servo
-
-__all__ = [
-    "__version__",
-    "accuracy",
-    "advise",
-    "atlas",
-    "basins",
-    "branch",
-    "catalog",
-    "certificate",
-    "check",
-    "derive",
-    "draw",
-    "endings",
-    "examples",
-    "export",
-    "following",
-    "forget",
-    "html",
-    "legs",
-    "lint",
-    "load",
-    "map",
-    "modes",
-    "observe",
-    "path",
-    "save",
-    "select",
-    "servo",
-    "shipped",
-    "singular",
-    "studio",
-    "text",
-    "verify",
-    "view",
-]
-
-_HOME = {
-    "accuracy": ".analysis.accuracy.accuracy",
-    "advise": ".analysis.advice",
-    "atlas": ".analysis.aspects.atlas",
-    "basins": ".simulation.endings.basins",
-    "branch": ".analysis.branch.proof",
-    "certificate": ".certificates",
-    "check": ".analysis.check",
-    "derive": ".analysis.derive",
-    "draw": ".present.show",
-    "examples": ".description",
-    "export": ".codegen.export",
-    "following": ".progress",
-    "forget": ".analysis.question",
-    "html": ".present.show",
-    "legs": ".analysis.controllability",
-    "lint": ".linting.lint",
-    "load": ".description",
-    "map": ".analysis.study",
-    "modes": ".analysis.modes.modes",
-    "observe": ".analysis.asked",
-    "path": ".analysis.aspects.path",
-    "save": ".description",
-    "select": ".selection.select",
-    "servo": ".simulation.servo",
-    "endings": ".simulation.endings.endings",
-    "shipped": ".description",
-    "singular": ".analysis.singularity.singular",
-    "studio": ".present.studio.server",
-    "text": ".present.show",
-    "verify": ".certificates",
-    "view": ".present.view.view",
-}
+__all__ = sorted([*homes(), "__version__", "catalog"])
 
 
 def __getattr__(name: str) -> object:
@@ -121,9 +24,9 @@ def __getattr__(name: str) -> object:
 
     if name == "catalog":
         return import_module(".catalog", __name__)
-    if name not in _HOME:
+    if name not in homes():
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value: object = globals().setdefault(name, getattr(import_module(_HOME[name], __name__), name))
+    value: object = globals().setdefault(name, getattr(import_module(f".{homes()[name]}", __name__), name))
     return value
 
 

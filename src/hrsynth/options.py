@@ -118,6 +118,17 @@ def options_of(function: Callable[..., Any]) -> Iterator[Option]:
                 yield replace(each, name=name, kind=kind, default=None if default == () else default)
 
 
+def kinds_of(function: Callable[..., Any]) -> dict[str, list[str]]:
+    """The types of a function's parameters by their names: ``["int", "None"]``."""
+    place = vars(sys.modules[function.__module__])
+    found = {}
+    for name, parameter in signature(function).parameters.items():
+        hint, *_ = _annotated(parameter.annotation, place)
+        parts = hint.split(" | ") if isinstance(hint, str) else get_args(hint) or (hint,)
+        found[name] = ["None" if each is NoneType else getattr(each, "__name__", str(each)) for each in parts]
+    return found
+
+
 def _annotated(annotation: Any, place: dict[str, Any]) -> tuple[Any, ...]:
     """A type and what annotates it; what is annotated by a type alone is not looked at."""
     if isinstance(annotation, str):

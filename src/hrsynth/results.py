@@ -114,6 +114,9 @@ class Result(Compared):
         """What is said in one line."""
         raise NotImplementedError
 
+    def require_answered(self, **asked: Any) -> None:
+        """Raise what ends the command with another status, where not all that was ``asked`` has an answer."""
+
     def said(self) -> tuple[Any, ...]:
         """What is compared: the robot with what is watched of it, and the record."""
         return getattr(self, "setting", None), self.to_dict()

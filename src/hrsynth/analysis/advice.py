@@ -19,14 +19,25 @@ from ..kinematics.sampling import Samples
 from ..mechanism import Direction, Joint, JointType, Mechanism, Observation
 from ..mechanism.observations import kinds
 from ..mechanism.sensors import encoders, observation_of, observed_line
-from ..options import plain_number
+from ..options import WATCHING, option, plain_number
 from ..progress import tell
 from ..records import FLAT, GAP, OPTIONAL, As, Shown, Word, recorded
 from ..results import Result, Value
 from ..tolerances import RANK_CUTOFF, SAME_PRICE, SAME_RELATION
 from .freedoms import Freedom
-from .observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike, as_robot, as_texts, restrict_samples
-from .question import question
+from .observed import (
+    CameraOption,
+    ObservedRobot,
+    ObserveOption,
+    RobotLike,
+    SeedOption,
+    SeeLike,
+    SeeOption,
+    as_robot,
+    as_texts,
+    restrict_samples,
+)
+from .question import analysis
 from .verdict import AT_REST, CONTROLLABLE, Verdict, verdict_of
 
 AXES = {JointType.UNIVERSAL: ("first", "second"), JointType.CYLINDRICAL: ("slide", "turn")}
@@ -219,19 +230,46 @@ class Advice(Result, shown_as="advise"):
     lost = Shown(tuple[Freedom, ...], lambda self: self.now.lost)
 
 
-@question()
+@analysis(
+    50,
+    examples=(
+        "uranesx",
+        "quattro --observe 1",
+        "quattro --observe 1 --offer point:platform,inclination",
+        "uranesx --offer point:platform --price point=3",
+        "gough_stewart --camera eye=base@0.3,0.1,0 --see point:platform@0.1,0,0 --offer point:platform",
+    ),
+)
 def advise(
     robot: RobotLike,
-    observe: LegsLike = None,
-    camera: CameraLike = None,
+    observe: ObserveOption = None,
+    camera: CameraOption = None,
     *,
-    see: SeeLike = None,
-    offer: SeeLike = None,
-    price: str = "",
+    see: SeeOption = None,
+    offer: Annotated[
+        SeeLike,
+        option(
+            "What could be observed in addition, written as for --see; without a place, such as "
+            "point:plate, several places of that link; separate more by commas, or repeat.",
+            "[CAMERA=]KIND:LINK[@x,y,z/dx,dy,dz/radius]",
+            kind=list[str],
+            group=WATCHING,
+        ),
+    ] = None,
+    price: Annotated[
+        str,
+        option(
+            "Prices by kind, such as encoder=0.5,point=3 (default: 1 each); the cheapest sets are "
+            "sought. Kinds: leg, direction, line, encoder and what is offered.",
+            "KIND=NUMBER",
+        ),
+    ] = "",
     most: int | None = None,
-    seed: int = 0,
+    seed: SeedOption = 0,
 ) -> Advice:
-    """The cheapest sets of further measurements with which u̇ = 0 forces t = 0 (theory.md 6; MMT 5.3): the smallest,
+    """What is missing: the smallest sets of further measurements that make a robot controllable.
+
+    The cheapest sets of further measurements with which u̇ = 0 forces t = 0 (theory.md 6; MMT 5.3): the smallest,
     unless ``price``, as ``encoder=0.5,point=3``, says what one measurement of a kind costs (default: 1).
 
     ``observe`` holds leg labels or link names (default: what the robot observes, else all legs), ``camera`` the link

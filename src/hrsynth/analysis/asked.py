@@ -53,7 +53,7 @@ def observe(
     False
     """
     robot = as_robot(robot)
-    require_range("observe", "seed", seed, "an integer")
+    require_range("seed", seed, "an integer", 0)
     if at is None:
         return ObservedRobot.of(robot, legs, camera, see=see, samples=samples, seed=seed)
     if isinstance(robot, ObservedRobot):

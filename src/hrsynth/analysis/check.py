@@ -9,27 +9,32 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from ..batch.reach import grid_dependence, sweep
-from ..errors import PlaneNotMet, PoseNotReached
+from ..errors import PlaneNotMet, PoseNotReached, RankUndecided
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism.pose import Grid, PoseLike, asked_poses
+from ..options import option
 from ..progress import tell
 from ..records import FLAT, As, Shown, Table, recorded
 from ..results import Result, Value
+from ..tolerances import RANK_GAP
 from .asked import asked_at, require_platform
 from .classes import Redundancy, list_redundant
 from .observed import (
+    POINTS,
+    POSES,
     UNLIMITED,
-    CameraLike,
-    LegsLike,
+    CameraOption,
     Mobility,
     MobilityWritten,
     ObservedRobot,
+    ObserveOption,
     RobotLike,
-    SeeLike,
+    SeedOption,
+    SeeOption,
     WatchedAxis,
 )
 from .posture import ConfigurationAnalysis, Posture
-from .question import question
+from .question import analysis
 
 UNREACHABLE = "unreachable"
 MEASURES = ("type2", "type1", "constraints", "condition", "mm_per_degree", "degrees_per_degree")
@@ -99,6 +104,14 @@ class Check(Result, shown_as="check"):
         """The mobility of the file's own links and joints, None where no samples of them can be drawn."""
         return self.setting.mobility_if_written
 
+    def require_answered(self, at: Any = None, **asked: Any) -> None:
+        """Raise ``RankUndecided`` and ``PoseNotReached`` at poses that were asked for."""
+        for posture in self.postures if at else ():
+            if not posture.decided:
+                raise RankUndecided(f"{self.setting.robot.name} at {posture.pose}", posture.gap, RANK_GAP)
+        if self.unreached:
+            raise PoseNotReached.of_all(self.unreached)
+
     def headline(self) -> str:
         """The robot, and the state of its hidden robot at each pose."""
         dof, states = self.setting.dof, list[str]()
@@ -116,18 +129,34 @@ class Check(Result, shown_as="check"):
     unlimited = Shown(list[str], lambda self: self.setting.unlimited, UNLIMITED)
 
 
-@question(formations=True)
+@analysis(
+    30,
+    examples=(
+        "quattro --at x=0.02,phi=30deg",
+        "quattro --grid x=-0.3:0.3:21,y=-0.3:0.3:21,z=-0.7 -o map.png",
+        f"gough_stewart {POINTS} --at x=0.02",
+    ),
+    formations=True,
+)
 def check(
     robot: RobotLike,
-    observe: LegsLike = None,
-    camera: CameraLike = None,
+    observe: ObserveOption = None,
+    camera: CameraOption = None,
     *,
-    see: SeeLike = None,
-    at: PoseLike | Iterable[PoseLike] = (),
-    grid: Grid | str | None = None,
-    seed: int = 0,
+    see: SeeOption = None,
+    at: Annotated[
+        PoseLike | Iterable[PoseLike],
+        option(f"A pose, such as x=0.02,y=0.1,z=-0.7,phi=10deg; {POSES}", "POSE", kind=list[str]),
+    ] = (),
+    grid: Annotated[
+        Grid | str | None,
+        option("A line, plane or box of poses, such as x=-0.3:0.3:21,y=-0.3:0.3:21,z=-0.7 (from:to:count).", "GRID"),
+    ] = None,
+    seed: SeedOption = 0,
 ) -> Check:
-    """Mobility, ranks with gaps, Type 1, 2, 3, Zlatanov's six numbers, constraint singularities and redundant
+    """Mobility, ranks, singularities and redundant constraints at poses, and over a grid of poses.
+
+    Mobility, ranks with gaps, Type 1, 2, 3, Zlatanov's six numbers, constraint singularities and redundant
     constraints (docs/pages/theory.md, section 7) at the poses ``at`` (default: the zero configuration) and over
     ``grid``.
 

@@ -10,24 +10,26 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from ..kinematics.sampling import Samples
 from ..mechanism.observation import labels_of
-from ..mechanism.pose import PoseLike, asked_pose
+from ..mechanism.pose import asked_pose
 from ..progress import tell
 from ..records import FLAT, As, Shown, recorded
 from ..results import Result
 from .asked import observe as observed
 from .exact import ExactVerdict, architecture
 from .observed import (
-    CameraLike,
-    LegsLike,
+    BeginOption,
+    CameraOption,
     ObservedRobot,
+    ObserveOption,
     OperationModeRecord,
     OtherMode,
     RobotLike,
-    SeeLike,
+    SeedOption,
+    SeeOption,
     WatchedAxis,
     restrict_samples,
 )
-from .question import question
+from .question import analysis
 from .verdict import Verdict, verdict_of
 
 if TYPE_CHECKING:
@@ -118,17 +120,28 @@ def _smallest(labels: tuple[str, ...], rank: Callable[[tuple[str, ...]], int]) -
     return [kept], True
 
 
-@question(formations=True)
+@analysis(
+    20,
+    examples=(
+        "quattro",
+        "quattro --observe arm_1,arm_2,rod_3a",
+        "quattro --camera platform",
+        "delta --observe 1,2 --see inclination:rod_1a",
+    ),
+    formations=True,
+)
 def legs(
     robot: RobotLike,
-    camera: CameraLike = None,
+    camera: CameraOption = None,
     *,
-    observe: LegsLike = None,
-    see: SeeLike = None,
-    at: PoseLike | None = None,
-    seed: int = 0,
+    observe: ObserveOption = None,
+    see: SeeOption = None,
+    at: BeginOption = None,
+    seed: SeedOption = 0,
 ) -> Legs:
-    """The verdict of every set of legs (theory.md 6), on the branch of the zero configuration or of the pose ``at``
+    """Sets of observed legs: their verdicts, the freedoms they lose, and the smallest sets that see the most.
+
+    The verdict of every set of legs (theory.md 6), on the branch of the zero configuration or of the pose ``at``
     (``mode:2``: a mode with all legs watched): of all legs at their default segments, or of the labels or links in
     ``observe``, together with what is seen with ``see``; observations count one by one.
 

@@ -19,6 +19,7 @@ from ..mechanism.legs import LegDecomposition, decompose
 from ..mechanism.normal import normal_form
 from ..mechanism.notation import Architecture
 from ..mechanism.observations.direction import Direction
+from ..options import option
 from ..progress import tell
 from ..records import ANGLE, FLAT, As, Shown, recorded
 from ..results import Result, Value
@@ -31,17 +32,20 @@ from .exact import ExactVerdict
 from .exact import architecture as exact_architecture
 from .freedoms import Freedom, name_freedoms
 from .observed import (
-    CameraLike,
-    LegsLike,
+    POINTS,
+    BeginOption,
+    CameraOption,
     Mobility,
     MobilityWritten,
     ObservedRobot,
+    ObserveOption,
     OperationModeRecord,
     OtherMode,
     RobotLike,
-    SeeLike,
+    SeedOption,
+    SeeOption,
 )
-from .question import question
+from .question import analysis
 from .verdict import Verdict, verdict_of
 
 if TYPE_CHECKING:
@@ -150,19 +154,33 @@ class Derivation(Result, shown_as="derive"):
     other_modes = Shown(list[OtherMode], lambda self: self.setting.other_modes)
 
 
-@question(formations=True)
+@analysis(
+    10,
+    examples=(
+        "quattro --observe 1,4",
+        "quattro --observe 1,4 -o hidden.urdf --report quattro.html",
+        "robot.urdf --platform plate --motors hip_1,hip_2,hip_3",
+        f"gough_stewart {POINTS}",
+    ),
+    formations=True,
+)
 def derive(
     robot: RobotLike,
-    observe: LegsLike = None,
-    camera: CameraLike = None,
+    observe: ObserveOption = None,
+    camera: CameraOption = None,
     *,
-    see: SeeLike = None,
-    at: PoseLike | None = None,
-    form: str = "simplified",
+    see: SeeOption = None,
+    at: BeginOption = None,
+    form: Annotated[
+        str,
+        option("simplified (by all rules) or general (sliders, all legs kept).", words=("simplified", "general")),
+    ] = "simplified",
     unchecked: bool = True,
-    seed: int = 0,
+    seed: SeedOption = 0,
 ) -> Derivation:
-    """The certified hidden robot of a robot and the legs that are watched (MMT 3.2; docs/pages/theory.md, sections 3 to
+    """The hidden robot of a robot, how it is derived, its certificate, and what the controller can see.
+
+    The certified hidden robot of a robot and the legs that are watched (MMT 3.2; docs/pages/theory.md, sections 3 to
     5).
 
     ``observe`` holds leg labels or link names (default: what the robot observes, else all legs); ``camera`` names the

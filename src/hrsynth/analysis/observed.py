@@ -24,11 +24,13 @@ from ..kinematics.relation import Measurement, Relation, relation
 from ..kinematics.sampling import Sample, Samples, sample
 from ..mechanism import Mechanism, Observation
 from ..mechanism.legs import LegDecomposition, decompose
+from ..mechanism.noise import Noise
 from ..mechanism.normal import NormalForm, normal_form
 from ..mechanism.observation import ObservationRecord, labels_of
 from ..mechanism.observations.direction import Direction
-from ..mechanism.pose import RADIANS, ModeNumber, Pose, PoseForm
+from ..mechanism.pose import RADIANS, ModeNumber, Pose, PoseForm, PoseLike
 from ..mechanism.sensors import default_observation, defaults_of, encoders, observation_of, reason
+from ..options import WATCHING, option
 from ..progress import tell
 from ..records import As, Record, Shown
 from ..results import Value, content
@@ -342,6 +344,66 @@ CameraLike = str | Iterable[str] | None
 """The link that carries the camera, or ``NAME=LINK@x,y,z/r,p,y``, or several of them."""
 SeeLike = str | Iterable[str] | None
 """``[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius``, or several of them."""
+ObserveOption = Annotated[
+    LegsLike,
+    option(
+        "Legs to watch (1,4), links, or all (default: what the file observes, else all; none with --see).",
+        "LEGS",
+        group=WATCHING,
+    ),
+]
+CameraOption = Annotated[
+    CameraLike,
+    option(
+        "The link that carries the camera; or a further camera with a name and its place on a link "
+        "(metres; radians or deg; focal length, width and height in pixels); repeat for more.",
+        "LINK|NAME=LINK@x,y,z/r,p,y/f,w,h",
+        kind=list[str],
+        group=WATCHING,
+    ),
+]
+SeeOption = Annotated[
+    SeeLike,
+    option(
+        "What else is observed: circle, depth, direction, distance, edge, edges, encoder, image_circle, "
+        "image_line, inclination, line, point or position, with a point, an axis and a radius where the kind "
+        "needs them (world: the base; for an encoder, its joint); repeat for more.",
+        "[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius",
+        kind=list[str],
+        group=WATCHING,
+    ),
+]
+SeedOption = Annotated[int, option("Seed of the random configurations.", "NUMBER", low=0)]
+BeginOption = Annotated[
+    PoseLike | None,
+    option(
+        "Pose to start from instead of the zero configuration, perhaps in another operation mode; or mode:2.", "POSE"
+    ),
+]
+StartOption = Annotated[
+    PoseLike,
+    option(
+        "Start pose, such as x=0.02,y=0.1,z=-0.7; mode:2 is a mode with the directions at the goal.",
+        "POSE",
+        old=("--from",),
+    ),
+]
+NoiseOption = Annotated[
+    str | Noise | None,
+    option(
+        "Largest errors of what else is observed, such as 0.3px (in images), 0.1deg or 1mm; separate several by "
+        "commas.",
+        "AMOUNT",
+    ),
+]
+JobsOption = Annotated[int | None, option("Processes (default: one per core).", low=1)]
+"""What many questions are asked with."""
+POSES = "or mode:2 of the list that modes gives; repeat for more (default: the zero configuration)."
+POINTS = (
+    "--camera eye=base@0.3,0.1,0 --see point:platform@0.1,0,0 --see point:platform@-0.1,0.1,0 "
+    "--see point:platform@0,0.1,0.1"
+)
+"""Three image points by a camera beside the robot: an example."""
 RobotLike = Mechanism | ObservedRobot | str | Path
 """A robot as a user gives it: as it was read or observed, the path of its file, the name of a shipped one."""
 
@@ -463,7 +525,7 @@ def _seeing(
         robot = replace(robot, camera=link)
     eyes = [each.name for each in named or robot.cameras]
     every = [("--see", text) for text in see] + [("--offer", text) for text in offer]
-    specs = [_spec(option, text, eyes) for option, text in every]
+    specs = [_spec(flag, text, eyes) for flag, text in every]
     used = {each.camera for each in specs} & set(eyes)
     for camera in named:
         if camera.name not in used and (used or not specs):  # an inclination or an encoder alone needs none
@@ -475,11 +537,11 @@ def _seeing(
             )
     robot = with_sights(robot, (), named)
     labels: list[set[str]] = [{o.leg for o in robot.observations}]
-    for (option, text), spec in zip(every, specs, strict=True):
+    for (flag, text), spec in zip(every, specs, strict=True):
         try:
             robot = with_sights(robot, [spec])
         except BadRequest as error:
-            raise BadRequest(f"{option} {text}: {error.what}", error.value, error.allowed) from None
+            raise BadRequest(f"{flag} {text}: {error.what}", error.value, error.allowed) from None
         labels.append({o.leg for o in robot.observations}.difference(*labels))
     return robot, set().union(*labels[1 : len(see) + 1]), set().union(*labels[len(see) + 1 :])
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Mapping
+from dataclasses import dataclass
 from functools import wraps
-from inspect import Signature, signature
+from inspect import signature
 from numbers import Integral, Real
 from threading import Lock
 from typing import Any, ParamSpec, TypeVar
@@ -16,7 +17,7 @@ import numpy as np
 from ..budgets import REMEMBERED_ANSWERS, REMEMBERED_GRIDS
 from ..errors import BadRequest, MissingExtra
 from ..mechanism import Mechanism
-from ..options import require_range
+from ..options import Option, kinds_of, options_of, require_range
 from ..results import content, require_keywords
 from .observed import as_robot, forget_robots, legs_asked
 
@@ -30,7 +31,19 @@ KINDS: dict[str, tuple[Any, str]] = {
     "str": (str, "a text"),
     "bool": ((bool, np.bool_), "True or False"),
 }
-"""What an argument must be whose annotation is one of these, and in words."""
+"""What an argument must be whose type is one of these, and in words."""
+
+
+@dataclass(frozen=True)
+class Declaration:
+    """What is said once of an analysis: its ``place`` in lists, what it answers in one line, its options, examples of
+    its command line, whether it takes a ``seed`` there."""
+
+    place: int
+    help: str
+    options: tuple[Option, ...]
+    examples: tuple[str, ...]
+    seeded: bool
 
 
 class AnswerMemory:
@@ -74,29 +87,41 @@ def forget_answers() -> None:
         memory.kept.clear()
 
 
-def require_kinds(question: str, known: Signature, given: Mapping[str, Any]) -> None:
+def require_kinds(kinds: Mapping[str, list[str]], options: Mapping[str, Option], given: Mapping[str, Any]) -> None:
     """Raise ``BadRequest`` for an argument that is no number, text or truth value where the signature asks for one, or
     a number out of its range."""
     for name, value in given.items():
-        kind, *none = str(known.parameters[name].annotation).split(" | ")
+        option = options.get(name)
+        kind, *none = kinds[name]
         if kind not in KINDS or none not in ([], ["None"]) or (none and value is None):
             continue
         right, word = KINDS[kind]
         if not isinstance(value, right) or (isinstance(value, bool) and kind != "bool"):
             raise BadRequest(name, value, word)
-        require_range(question, name, value, word)
+        if option is not None:
+            require_range(name, value, word, option.low, option.high)
 
 
-def question(*, formations: bool = False, **old: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
+def analysis(
+    place: int, *, examples: tuple[str, ...], seeded: bool = True, formations: bool = False, **old: str
+) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """A function of a robot whose answers are frozen values: the robot is also taken by its name or path, and what was
     asked before is not computed again. ``old`` names of options, each with the one that it has now, are taken for one
     version more. ``formations``: whether it can be asked of several bodies; else these are refused.
+
+    Everything else that is said of it is its :class:`Declaration`: its options stand in the annotations of its
+    parameters, what it answers in the first lines of its docstring. The index of all analyses is made of these
+    (:mod:`hrsynth.index`).
 
     The same question is one with equal arguments about an equal robot, read from the same file.
     """
 
     def made(function: Callable[P, R]) -> Callable[P, R]:
         known = signature(function)
+        options = tuple(options_of(function))
+        kinds = kinds_of(function)
+        by_name = {each.name: each for each in options}
+        summary = " ".join((function.__doc__ or "").partition("\n\n")[0].split())
 
         @wraps(function)
         def asked(*args: Any, **given: Any) -> Any:
@@ -115,7 +140,7 @@ def question(*, formations: bool = False, **old: str) -> Callable[[Callable[P, R
                 bound = known.bind(*args, **given)
             except TypeError as error:
                 raise TypeError(f"{function.__name__}: {error}; it takes {', '.join(known.parameters)}") from None
-            require_kinds(function.__name__, known, bound.arguments)
+            require_kinds(kinds, by_name, bound.arguments)
             robot = bound.arguments["robot"] = as_robot(bound.arguments["robot"])
             source = robot if isinstance(robot, Mechanism) else robot.robot
             if source.formation and not formations:
@@ -130,8 +155,8 @@ def question(*, formations: bool = False, **old: str) -> Callable[[Callable[P, R
             every.apply_defaults()
             if "observe" in every.arguments:
                 every.arguments["observe"] = legs_asked(robot, every.arguments["observe"], every.arguments.get("see"))
-            options = [(name, content(value)) for name, value in every.arguments.items() if name != "robot"]
-            key = (function.__qualname__, robot, source.file, source.notes, source.options, source.sha256, *options)
+            told = [(name, content(value)) for name, value in every.arguments.items() if name != "robot"]
+            key = (function.__qualname__, robot, source.file, source.notes, source.options, source.sha256, *told)
             try:
                 hash(key)
             except TypeError:
@@ -140,6 +165,7 @@ def question(*, formations: bool = False, **old: str) -> Callable[[Callable[P, R
             return (_GRIDS if large else _ANSWERS).answer(key, lambda: function(*bound.args, **bound.kwargs))
 
         asked.__signature__ = known  # type: ignore[attr-defined]
+        asked.declaration = Declaration(place, summary, options, examples, seeded)  # type: ignore[attr-defined]
         return asked
 
     return made

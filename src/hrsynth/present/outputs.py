@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BadRequest
+from ..options import Option
 
 Content = bytes | Iterable[bytes]
 Asked = Mapping[str, Any]
@@ -37,7 +38,7 @@ class File:
 
     ``part`` names the part of the answer that is written, None where it was not asked for; then ``needs`` are the
     options that ask for it, and ``words`` what it is called. ``computed`` is made of the answer first, with the options
-    that it ``takes`` and the seed; the makers get it too, and the JSON as ``record``.
+    that it ``asks`` for and the seed; the makers get it too, and the JSON as ``record``.
     """
 
     refusal: str
@@ -52,7 +53,7 @@ class File:
     needs: tuple[str, ...] = ()
     words: str = ""
     computed: str | None = None
-    takes: tuple[str, ...] = ()
+    asks: tuple[Option, ...] = ()
     record: str | None = None
     nothing: str | None = None
     """Tells why there is nothing to draw in an answer, or None."""
@@ -66,6 +67,11 @@ class File:
     """The endings that are drawn with matplotlib."""
     streamed: tuple[str, str] | None = None
     """An ending that is written part by part while the question is answered, and the parameter that names the file."""
+
+    @property
+    def takes(self) -> tuple[str, ...]:
+        """The names of what it asks for."""
+        return tuple(each.name for each in self.asks)
 
     def require(self, path: str | None, asked: Asked) -> None:
         """Raise ``BadRequest`` where there is nothing to write, the ending is no format or the file cannot be written,
@@ -358,7 +364,10 @@ OUTPUTS = {
                 "The locus",
                 "Draw the locus: locus.png, .pdf, .svg.",
                 computed="maps:locus",
-                takes=("plane", "steps"),
+                asks=(
+                    Option("plane", "Plane of poses to draw, such as z=-0.7.", "PART=VALUE"),
+                    Option("steps", "Poses along each side of the plane.", None, int, 51, low=5, high=300),
+                ),
                 record="locus",
                 drawn=True,
                 limited=(FIGURES, "maps:require_plane"),

@@ -123,7 +123,7 @@ def draw(
 
     Raises ``BadRequest`` for a result that has no picture.
     """
-    require_range("draw", "steps", steps, "an integer")
+    require_range("steps", steps, "an integer", 5, 300)
     asked = {"plane": plane, "steps": steps, "seed": 0, "width": width, "font": font}
     if not isinstance(result, Result):
         raise BadRequest("a picture of", repr(result), "what a function of hrsynth answers")

@@ -26,7 +26,7 @@ from ...results import Value, content
 from ...tolerances import LARGEST_FIRST_ORDER
 from ...version import __version__
 from .error_map import SPOTS, Mapper, Seen, Spots
-from .options import ErrorRange, Tally
+from .ranges import ErrorRange, Tally
 
 ENDING, PART, JOURNAL = ".npy", ".part", ".journal"
 ROW = np.dtype([("position", "<f8"), ("orientation", "<f8")])

@@ -17,13 +17,14 @@ from ...budgets import ATLAS_INTERVALS
 from ...errors import PoseNotReached
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism.pose import ModeNumber, PoseLike
+from ...options import option
 from ...progress import tell
 from ...records import FLAT, As, Shown, recorded
 from ...results import Result, Value
 from ...tolerances import FOLLOWED
 from ..modes.modes import AssemblyModes, at_mode, modes
-from ..observed import CameraLike, LegsLike, RobotLike, SeeLike
-from ..question import question
+from ..observed import CameraOption, ObserveOption, RobotLike, SeedOption, SeeOption
+from ..question import analysis
 from .held_leg import HeldLegSection, section
 from .path import BUDGET, Aspects, PathAnswer
 from .three_cranks import CrankPlace, three_cranks
@@ -149,18 +150,31 @@ class Atlas(Result, shown_as="atlas"):
     )
 
 
-@question()
+@analysis(
+    80,
+    examples=(
+        "quattro --observe 1,4",
+        "3rrr_m1 --observe 2,1,3 -o atlas.png",
+    ),
+)
 def atlas(
     robot: RobotLike,
-    observe: LegsLike = None,
-    camera: CameraLike = None,
+    observe: ObserveOption = None,
+    camera: CameraOption = None,
     *,
-    see: SeeLike = None,
-    at: PoseLike | ClosedConfiguration | None = None,
-    seed: int = 0,
+    see: SeeOption = None,
+    at: Annotated[
+        PoseLike | ClosedConfiguration | None,
+        option(
+            "Pose whose directions are held, such as x=0.02,y=0.1,z=-0.7 (default: the zero configuration).", "POSE"
+        ),
+    ] = None,
+    seed: SeedOption = 0,
     budget: int = BUDGET,
 ) -> Atlas:
-    """Which two of all modes with the directions at ``at`` (as for ``modes``) lie in one aspect (as for ``path``), and
+    """Which modes with the same directions can be reached from each other without a Type 2 singularity, mode by mode.
+
+    Which two of all modes with the directions at ``at`` (as for ``modes``) lie in one aspect (as for ``path``), and
     whether that shows the hidden robot to be cuspidal: that it can go from one mode to another, with the same
     directions, without a Type 2 singularity.
 

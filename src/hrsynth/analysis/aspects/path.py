@@ -18,6 +18,7 @@ from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.steps import lead_to, track
 from ...mechanism.observation import Observation
 from ...mechanism.pose import ModeNumber, Pose, PoseLike, asked_pose
+from ...options import option
 from ...progress import tell
 from ...records import As, Shown, recorded
 from ...results import Result, Value
@@ -25,8 +26,19 @@ from ...tolerances import AS_PRINTED, RANK_CUTOFF, RANK_GAP, SOLVED
 from ..accuracy.cones import unseen
 from ..asked import configurations_at
 from ..measured import MeasuredRobot
-from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
-from ..question import question
+from ..observed import (
+    CameraLike,
+    CameraOption,
+    LegsLike,
+    ObservedRobot,
+    ObserveOption,
+    RobotLike,
+    SeedOption,
+    SeeLike,
+    SeeOption,
+    StartOption,
+)
+from ..question import analysis
 from ..singularity.agreement import smallest_of, weakest
 from .condition_enclosure import ConditionEnclosure, PathSegment, enclose_value, is_beyond, sign_of
 from .leg_forms import LegForms, LegPattern, pattern
@@ -465,19 +477,29 @@ class Aspects(Value):
         return replace(answer, coordinates=known.coordinates, ways=found.ways, poses=poses)
 
 
-@question()
+@analysis(
+    90,
+    examples=(
+        "quattro --observe 1,4 --start x=0.05 --goal x=-0.05,phi=20deg",
+        "3rrr_m1 --start x=0,y=0 --goal mode:2 --certificate c.json",
+    ),
+)
 def path(
     robot: RobotLike,
-    observe: LegsLike = None,
-    camera: CameraLike = None,
+    observe: ObserveOption = None,
+    camera: CameraOption = None,
     *,
-    see: SeeLike = None,
-    start: PoseLike,
-    goal: PoseLike,
-    seed: int = 0,
+    see: SeeOption = None,
+    start: StartOption,
+    goal: Annotated[
+        PoseLike, option("Goal pose; mode:2 is a mode with the directions at the start.", "POSE", old=("--to",))
+    ],
+    seed: SeedOption = 0,
     budget: int = BUDGET,
 ) -> PathAnswer:
-    """Whether a path without Type 2 singularity of the hidden robot joins two poses (docs/pages/theory.md, section 9).
+    """Whether a path without Type 2 singularity joins two poses, with a proof: same aspect, separated, undecided.
+
+    Whether a path without Type 2 singularity of the hidden robot joins two poses (docs/pages/theory.md, section 9).
     Its condition is that of the real robot's relation, which is the exact lift's (theory.md 3). The path passes only
     through poses at which everything seen has a value, in front of the camera or not.
 

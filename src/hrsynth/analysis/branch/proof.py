@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Annotated
 
 import numpy as np
 
@@ -11,10 +12,11 @@ from ...description.assembly.zero import at_file_zero
 from ...errors import BadMechanism, BadRequest, LoopsNotClosed
 from ...geometry.vectors import Array
 from ...mechanism import Mechanism
+from ...options import option
 from ...progress import tell
 from ...tolerances import CLOSED
 from ..observed import RobotLike, as_robot
-from ..question import question
+from ..question import analysis
 from .answer import BranchCell, BranchPart, BranchProof
 from .back import way_back
 from .cells import prove_all
@@ -30,9 +32,27 @@ BOUNDED = "bounded over the tubes"
 BoxLike = Mapping[str, Sequence[float]] | str
 
 
-@question()
-def branch(robot: RobotLike, box: BoxLike | None = None, *, effort: int = BRANCH_CELLS) -> BranchProof:
-    """Where the passive coordinates are proved to be one continuous function of the motors, on the branch of the zero
+BoxOption = Annotated[
+    BoxLike | None,
+    option(
+        "Intervals of motors (m, rad), such as hip=-1:1,slide=0:0.2 (default: the file's limits, else a "
+        "whole turn, or a characteristic length either way).",
+        "INTERVALS",
+    ),
+]
+CellsOption = Annotated[int, option("Most cells to try for each part of the loops.", "COUNT", low=1)]
+
+
+@analysis(
+    60,
+    examples=("rrrrr_m1 --box shoulder_1=-0.2:0.2,shoulder_2=-0.2:0.2",),
+    seeded=False,
+)
+def branch(robot: RobotLike, box: BoxOption = None, *, effort: CellsOption = BRANCH_CELLS) -> BranchProof:
+    """Where the joints are proved to be one function of the motors, on the branch of the zero configuration, and where
+    that ends.
+
+    Where the passive coordinates are proved to be one continuous function of the motors, on the branch of the zero
     configuration (docs/pages/branch.md).
 
     ``box`` gives the motors' intervals (m, rad), as a mapping or as text ``hip=-1:1,slide=0:0.2``; the default is the

@@ -20,14 +20,24 @@ from ...kinematics.relation import Measurement
 from ...kinematics.tasks import Task
 from ...mechanism.observation import Observation
 from ...mechanism.pose import ModeNumber, Pose, PoseLike, asked_pose
+from ...options import option
 from ...progress import tell
 from ...records import FLAT, OPTIONAL, As, Shown, recorded
 from ...results import Result
 from ...tolerances import MEASUREMENT_BOUND, SAME_NEAR_POSE
 from ..formation import Formation
 from ..measured import MeasuredRobot
-from ..observed import UNLIMITED, CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
-from ..question import question
+from ..observed import (
+    POINTS,
+    UNLIMITED,
+    CameraOption,
+    ObservedRobot,
+    ObserveOption,
+    RobotLike,
+    SeedOption,
+    SeeOption,
+)
+from ..question import analysis
 from .assembly_mode import AssemblyMode, ModeReader, found_mode
 from .branches import Model
 from .carried import CarriedPlatform
@@ -218,21 +228,49 @@ class AssemblyModes(Result, shown_as="modes"):
         ]
 
 
-@question(formations=True)
+@analysis(
+    70,
+    examples=(
+        "quattro --observe 1,3 --at x=0.05,y=0.1,z=-0.7",
+        "3rrr_m1 --real -o modes.png",
+        "quattro --observe 1,4 --certificate c.json",
+        f"gough_stewart {POINTS}",
+    ),
+    formations=True,
+)
 def modes(
     robot: RobotLike,
-    observe: LegsLike = None,
-    camera: CameraLike = None,
+    observe: ObserveOption = None,
+    camera: CameraOption = None,
     *,
-    see: SeeLike = None,
-    at: PoseLike | ClosedConfiguration | None = None,
-    real: bool = False,
-    cone: float | str = MEASUREMENT_BOUND,
+    see: SeeOption = None,
+    at: Annotated[
+        PoseLike | ClosedConfiguration | None,
+        option(
+            "Pose whose measurements are held, such as x=0.02,y=0.1,z=-0.7; or mode:2 of the list "
+            "printed without --at (default: the zero configuration).",
+            "POSE",
+        ),
+    ] = None,
+    real: Annotated[bool, option("Hold the real robot's own motors instead.")] = False,
+    cone: Annotated[
+        float | str,
+        option("Error of a measurement: poses that differ by no more are near modes; 0 for none.", "ANGLE"),
+    ] = MEASUREMENT_BOUND,
     as_written: bool = False,
-    effort: float = EFFORT,
-    seed: int = 0,
+    effort: Annotated[
+        float,
+        option(
+            "Time limit for a list (estimated seconds on one core); what needs more is left out, and reported.",
+            "SECONDS",
+            low=0,
+        ),
+    ] = EFFORT,
+    seed: SeedOption = 0,
 ) -> AssemblyModes:
-    """All poses with what is observed at ``at`` (default: the zero configuration), or with ``real`` the motors'
+    """Assembly modes: poses of the platform with the same measurements, and whether they are proved to be all.
+
+    All poses with what is observed at ``at`` (default: the zero configuration), or with ``real`` the motors'
     coordinates: complex solutions counted, real ones enclosed (theory.md 8; MMT 3.3, 4.1.2, 4.2).
 
     A Π stays a parallelogram, never crossed (except in planar mechanisms that are closed loop by loop, and in

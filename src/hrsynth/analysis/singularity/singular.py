@@ -15,18 +15,27 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement, platform_motions, relation
 from ...kinematics.tasks import solve
 from ...mechanism.pose import Pose
+from ...options import option
 from ...progress import tell
 from ...records import As, Shown, Word, recorded
 from ...results import Result, Value
 from ...tolerances import SOLVED
 from ..freedoms import Freedom, name_freedoms
 from ..measured import MeasuredRobot
-from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
-from ..question import question
+from ..observed import (
+    POINTS,
+    CameraOption,
+    ObservedRobot,
+    ObserveOption,
+    RobotLike,
+    SeedOption,
+    SeeOption,
+)
+from ..question import analysis
 from ..verdict import Verdict
 from .agreement import Agreement, agreement, weakest
 
-POINTS = 10_000
+RANDOM_POSES = 10_000
 """Random poses at which words, expression and rank are compared."""
 EXAMPLES = 3
 
@@ -125,18 +134,29 @@ class Singularity(Result, shown_as="singular"):
     )
 
 
-@question()
+@analysis(
+    40,
+    examples=(
+        "quattro --observe 1,4",
+        "quattro --observe 1,4 --plane z=-0.7,phi=0 -o locus.png",
+        f"gough_stewart {POINTS}",
+    ),
+)
 def singular(
     robot: RobotLike,
-    observe: LegsLike = None,
-    camera: CameraLike = None,
+    observe: ObserveOption = None,
+    camera: CameraOption = None,
     *,
-    see: SeeLike = None,
-    real: bool = False,
-    points: int = POINTS,
-    seed: int = 0,
+    see: SeeOption = None,
+    real: Annotated[bool, option("Ask about the real robot with its own motors instead of the hidden one.")] = False,
+    points: Annotated[
+        int, option("Number of random poses at which the condition is checked.", low=1, high=10_000_000)
+    ] = RANDOM_POSES,
+    seed: SeedOption = 0,
 ) -> Singularity:
-    """The Type 2 condition of the hidden robot (``real``: of the real robot with its own motors), theory.md 7; MMT 3.3.
+    """Where a freedom of the platform is lost: the Type 2 condition in words, as an expression and drawn.
+
+    The Type 2 condition of the hidden robot (``real``: of the real robot with its own motors), theory.md 7; MMT 3.3.
 
     It is computed from the real robot's legs and relation, which are those of the exact lift (theory.md 3).
     Words, expression and rank are compared at ``points`` random reachable poses and at singular poses constructed from

@@ -1,0 +1,116 @@
+"""The index of the public functions, made of their declarations: ``python -m hrsynth.index`` writes ``index.json`` and
+``__init__.pyi`` anew.
+
+``import hrsynth`` and the help of the command line read it instead of loading what computes.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, fields
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from .options import NEEDED, Option
+
+PACKAGE = Path(__file__).parent
+INDEX, STUB = PACKAGE / "index.json", PACKAGE / "__init__.pyi"
+MARK = "\n@analysis(\n"
+KINDS: dict[str, Any] = {"str": str, "int": int, "float": float, "bool": bool, "several": list[str]}
+HELPERS = {
+    "analysis.asked": ("observe",),
+    "analysis.question": ("forget",),
+    "analysis.study": ("map",),
+    "certificates": ("certificate", "verify"),
+    "description": ("examples", "load", "save", "shipped"),
+    "linting.lint": ("lint",),
+    "present.show": ("draw", "html", "text"),
+    "present.studio.server": ("studio",),
+    "progress": ("following",),
+}
+"""Public functions that are no analyses of a robot, by their module."""
+
+
+@cache
+def analyses() -> dict[str, dict[str, Any]]:
+    """What is declared of each analysis, by its name, in the order of lists."""
+    found: dict[str, dict[str, Any]] = json.loads(INDEX.read_text(encoding="utf-8"))
+    return found
+
+
+@cache
+def homes() -> dict[str, str]:
+    """The module of each public function, below the package."""
+    helpers = {name: module for module, names in HELPERS.items() for name in names}
+    return helpers | {name: each["module"] for name, each in analyses().items()}
+
+
+def options(name: str) -> list[Option]:
+    """The options of an analysis."""
+    return [_read(each) for each in analyses()[name]["options"]]
+
+
+def _told(option: Option) -> dict[str, Any]:
+    """An option as the index has it: what differs from the defaults."""
+    default = {each.name: each.default for each in fields(Option)}
+    told = {name: value for name, value in asdict(option).items() if value != default[name]}
+    kind = next(name for name, each in KINDS.items() if each == option.kind)
+    needed = {"needed": True} if told.get("default") is NEEDED else {}
+    return {**{name: value for name, value in told.items() if value is not NEEDED}, "kind": kind, **needed}
+
+
+def _read(told: dict[str, Any]) -> Option:
+    """The option that was told."""
+    given = {name: tuple(value) if isinstance(value, list) else value for name, value in told.items()}
+    given["kind"] = KINDS[given["kind"]]
+    if given.pop("needed", False):
+        given["default"] = NEEDED
+    return Option(**given)
+
+
+def declared() -> dict[str, dict[str, Any]]:
+    """The same as the modules declare it, all of which are loaded."""
+    found: dict[int, tuple[str, dict[str, Any]]] = {}
+    for path in sorted(PACKAGE.rglob("*.py")):
+        if MARK not in path.read_text(encoding="utf-8"):
+            continue
+        place = ".".join(path.relative_to(PACKAGE).with_suffix("").parts)
+        for name, value in vars(import_module(f"hrsynth.{place}")).items():
+            declaration = getattr(value, "declaration", None)
+            if declaration is not None and value.__module__ == f"hrsynth.{place}":
+                found[declaration.place] = (
+                    name,
+                    {
+                        "module": place,
+                        "help": declaration.help,
+                        "seeded": declaration.seeded,
+                        "examples": list(declaration.examples),
+                        "options": [_told(each) for each in declaration.options],
+                    },
+                )
+    return dict(found[place] for place in sorted(found))
+
+
+def index_text() -> str:
+    """What ``index.json`` should hold."""
+    return json.dumps(declared(), ensure_ascii=False, indent=1) + "\n"
+
+
+def stub_text() -> str:
+    """What ``__init__.pyi`` should hold: the public functions with their types, for editors and type checkers."""
+    places = homes()
+    lines = ['"""Made by python -m hrsynth.index."""', "", "from . import catalog as catalog"]
+    lines += [
+        f"from .{place} import {name} as {name}" for place, name in sorted((places[name], name) for name in places)
+    ]
+    public = "".join(f'    "{name}",\n' for name in sorted([*places, "__version__", "catalog"]))
+    return "\n".join([*lines, "from .version import __version__ as __version__", "", f"__all__ = [\n{public}]", ""])
+
+
+if __name__ == "__main__":
+    INDEX.write_text(index_text(), encoding="utf-8")
+    analyses.cache_clear()
+    homes.cache_clear()
+    STUB.write_text(stub_text(), encoding="utf-8")
