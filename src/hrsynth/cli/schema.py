@@ -51,7 +51,8 @@ def schema(command: str) -> dict[str, Any]:
     else:
         function = getattr(hrsynth, command)
         kind = vars(sys.modules[function.__module__])[function.__annotations__["return"]]
-        head, words = object_schema([OfRobot, kind], parts), kind.__doc__
+        begins = OfRobot if "robot" in function.__annotations__ else Head
+        head, words = object_schema([begins, kind], parts), kind.__doc__
         for file in OUTPUTS[command].files:
             if file.option is not None and file.field is not None:
                 head["properties"][file.field] = records.schema(str | None, parts)
