@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations, islice
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, TypedDict
 
 import numpy as np
 
@@ -168,7 +168,7 @@ class SightRecord(NamedTuple):
     focal: float
 
 
-class Unexamined(NamedTuple):
+class Unexamined(TypedDict):
     """How many sets were not examined, and why."""
 
     count: int
@@ -225,11 +225,11 @@ class Selection(Result, shown_as="select"):
     def told_sight(self) -> SightRecord | None:
         """The camera; None where none was asked for."""
         eye = self.sight
-        return eye and SightRecord(eye.reference, eye.camera.place, eye.camera.focal)
+        return None if eye is None else SightRecord(eye.reference, eye.camera.place, eye.camera.focal)
 
     noise = Shown(dict[str, float], lambda self: self.blur.amounts, "by its unit (px, m, rad)")
     best = Shown(list[str] | None, lambda self: self.kept[0].legs if self.kept else None)
-    not_examined = Shown(Unexamined, lambda self: Unexamined(len(self.unexamined), self.left))
+    not_examined = Shown(Unexamined, lambda self: {"count": len(self.unexamined), "reason": self.left})
     unlimited = Shown(list[str], lambda self: self.setting.unlimited, UNLIMITED)
 
 
