@@ -54,7 +54,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 @dataclass(frozen=True)
 class As:
     """How a member is told: under which ``name``, times a ``scale``, rounded to ``digits``; ``flat``: its own members,
-    but those ``without``, stand in its place; ``optional``: it is left out where it is None."""
+    but those ``without``, stand in its place; ``optional``: it is left out where it is None; ``scaled``: it is told
+    times the scale of the member that holds its record."""
 
     name: str | None = None
     scale: float | None = None
@@ -62,9 +63,10 @@ class As:
     flat: bool = False
     without: tuple[str, ...] = ()
     optional: bool = False
+    scaled: bool = False
 
 
-FLAT, OPTIONAL = As(flat=True), As(optional=True)
+FLAT, OPTIONAL, SCALED = As(flat=True), As(optional=True), As(scaled=True)
 
 
 @dataclass(frozen=True)
@@ -142,11 +144,12 @@ class OfRobot(Head):
     platform: Platform
 
 
-def _told(value: Any) -> dict[str, Any]:
+def _told(value: Any, scale: float | None = None) -> dict[str, Any]:
     """The members of a record or a named tuple."""
     found: dict[str, Any] = {}
     for member in members(type(value)):  # type: ignore[arg-type]
-        part = plain(getattr(value, member.attribute), member.how)
+        how = replace(member.how, scale=scale) if member.how.scaled else member.how
+        part = plain(getattr(value, member.attribute), how)
         if member.how.flat:
             found |= {name: each for name, each in (part or {}).items() if name not in member.how.without}
         elif part is not None or not member.how.optional:
@@ -159,7 +162,7 @@ def plain(value: Any, how: As = As()) -> Any:
     if value is None or isinstance(value, bool | str):
         return value
     if hasattr(value, "to_dict"):
-        return value.to_dict()
+        return value.to_dict() if how.scale is None else _told(value, how.scale)
     if isinstance(value, Mapping):
         return {name: plain(each, how) for name, each in value.items()}
     if hasattr(value, "_fields"):

@@ -5,16 +5,18 @@ from __future__ import annotations
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, NamedTuple
 
-from ..analysis.branch.answer import BranchProof
+from ..analysis.branch.answer import BACK, BranchLimit, BranchProof
 from ..analysis.branch.proof import BoxLike, branch, parsed_box
 from ..analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, as_robot, as_texts
 from ..analysis.question import question
 from ..budgets import BRANCH_CELLS
 from ..errors import BadRequest, HrsynthError
+from ..geometry.vectors import Array
 from ..mechanism.observations.direction import Direction
 from ..progress import tell
+from ..records import Shown, Table, recorded
 from ..results import Result
 from ..tolerances import GENERATED_CLOSED, GENERATED_LAST_STEP
 from .inverse import closed_inverse
@@ -23,21 +25,37 @@ from .source import ProvedBounds, Source
 from .tubes import TubedBranch
 
 
+class ExportedPart(NamedTuple):
+    """Motors with the passive coordinates that they alone decide: how much of the box is proved, and a box that is."""
+
+    motors: tuple[str, ...]
+    share: float
+    proved: Annotated[tuple[Array, Array], Table, "low and high of each motor (m, rad)"]
+
+
+class FreeMotor(NamedTuple):
+    """A motor in no loop, and the interval in which the program answers (m, rad)."""
+
+    motor: str
+    lower: float
+    upper: float
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class ExportedCode(Result, shown_as="export"):
     """A program, its language, and the proof on which it rests; ``legs`` are those whose directions it gives."""
 
     proof: BranchProof
-    lang: str
-    legs: tuple[str, ...]
+    lang: Annotated[str, Literal["c++", "numpy"]]
+    legs: Annotated[tuple[str, ...], ""]
     closed: bool
     """Whether the motors of a pose are found in closed form."""
     bounds: ProvedBounds | None
     """Newton's steps that are enough, and how far an answer is off at most (proved); None where a cell has no bound."""
-    cells: int
+    cells: Annotated[int, ""]
     """How many cells the program holds."""
     code: str
-    free: tuple[tuple[str, float, float], ...] = ()
+    free: Annotated[tuple[FreeMotor, ...], ""] = ()
     """Motors in no loop, with the interval (m, rad) in which the program answers."""
 
     @property
@@ -54,26 +72,32 @@ class ExportedCode(Result, shown_as="export"):
         """The robot, and how much is proved."""
         return f"{self.lang} of {self.proof.headline()}"
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line, without the command's own fields."""
-        return {
-            "lang": self.lang,
-            "motors": list(self.proof.motors),
-            "passive": list(self.proof.passive),
-            "held": list(self.proof.held),
-            "legs": list(self.legs),
-            "cells": self.cells,
-            "inverse": "closed form" if self.closed else "Newton's method",
-            "steps": self.bounds.steps if self.bounds else None,
-            "error": self.bounds.error if self.bounds else None,
-            "back": None if self.proof.back is None else [each.tolist() for each in self.proof.back],
-            "parts": [
-                {"motors": list(part.motors), "share": part.share, "proved": [each.tolist() for each in part.proved]}
-                for part in self.proof.parts
-            ],
-            "limits": [each.to_dict() for each in self.proof.limits],
-            "free": [{"motor": name, "lower": low, "upper": high} for name, low, high in self.free],
-        }
+    motors = Shown(list[str], lambda self: self.proof.motors)
+    passive = Shown(list[str], lambda self: self.proof.passive)
+    held = Shown(list[str], lambda self: self.proof.held)
+    inverse = Shown(
+        Literal["closed form", "Newton's method"],
+        lambda self: "closed form" if self.closed else "Newton's method",
+        "how the program finds the motors of a pose",
+    )
+    steps = Shown(
+        int | None,
+        lambda self: self.bounds and self.bounds.steps,
+        "steps of Newton's method that are enough in each part (proved), or null",
+    )
+    error = Shown(
+        float | None,
+        lambda self: self.bounds and self.bounds.error,
+        "how far an answer is off at most (rad, 1, characteristic lengths; proved), or null",
+    )
+    back = Shown(Table | None, lambda self: self.proof.back, BACK)
+    limits = Shown(list[BranchLimit], lambda self: self.proof.limits)
+
+    @property
+    @recorded()
+    def parts(self) -> list[ExportedPart]:
+        """The parts of the proof, without their cells."""
+        return [ExportedPart(each.motors, each.share, each.proved) for each in self.proof.parts]
 
 
 @question()
@@ -143,11 +167,11 @@ def _watched_directions(robot: Any, observe: LegsLike, camera: CameraLike) -> tu
     )
 
 
-def _free(proof: BranchProof, branch_: TubedBranch) -> tuple[tuple[str, float, float], ...]:
+def _free(proof: BranchProof, branch_: TubedBranch) -> tuple[FreeMotor, ...]:
     """The motors in no loop, and where the program answers."""
     moving = {name for part in proof.parts for name in part.motors}
     return tuple(
-        (name, float(low), float(high))
+        FreeMotor(name, float(low), float(high))
         for name, low, high in zip(proof.motors, branch_.lower, branch_.upper, strict=True)
         if name not in moving
     )

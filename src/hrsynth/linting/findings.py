@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Literal
 
+from ..records import As
 from ..results import Value
 
 if TYPE_CHECKING:
@@ -47,17 +48,16 @@ class LintRule:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Finding(Value):
+class Finding(Value, all_told=True):
     """One thing that is wrong, doubtful or lost, with its file and line and what to do about it."""
 
     rule: str
-    severity: str
+    severity: Annotated[str, Literal["error", "warning", "note"]]
     file: str
-    line: int | None
+    line: Annotated[int | None, "null if it concerns the whole file"]
     message: str
-    advice: str | None = None
-    mends: bool = False
-    """Whether ``--fix`` mends it."""
+    advice: Annotated[str | None, As("fix"), "what to do about it"] = None
+    mends: Annotated[bool, "whether --fix mends it"] = False
 
     @property
     def rank(self) -> int:
@@ -68,15 +68,3 @@ class Finding(Value):
     def where(self) -> str:
         """File and line."""
         return self.file if self.line is None else f"{self.file}:{self.line}"
-
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {
-            "rule": self.rule,
-            "severity": self.severity,
-            "file": self.file,
-            "line": self.line,
-            "message": self.message,
-            "fix": self.advice,
-            "mends": self.mends,
-        }

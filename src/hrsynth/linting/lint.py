@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, NamedTuple, TypedDict
 
 from ..budgets import MOST_MENDING
 from ..description import file_of
 from ..description.files import require_writable, write_whole
 from ..description.overrides import Overrides, names
 from ..errors import BadRequest, BadRobotFile, Defect
+from ..records import As, Shown, recorded
 from ..results import Result, require_keywords
 from .findings import SEVERITIES, Finding, Mend
 from .rules import lint_rules
@@ -19,15 +20,31 @@ from .rules.readers import PROGRAMS
 from .subject import LintedFile
 
 
+class LintCounts(TypedDict):
+    """How many findings are of each severity."""
+
+    error: int
+    warning: int
+    note: int
+
+
+class Unread(NamedTuple):
+    """A file that could not be opened, or is no document, and why."""
+
+    file: str
+    line: int | None
+    message: str
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Lint(Result, shown_as="lint"):
     """What was found in which files, and what was mended and where that is written; ``unread``: why others of several
     files could not be opened."""
 
-    files: tuple[str, ...]
-    findings: tuple[Finding, ...]
-    mended: tuple[Finding, ...] = ()
-    written: str | None = None
+    files: Annotated[tuple[str, ...], ""]
+    findings: Annotated[tuple[Finding, ...], ""]
+    mended: Annotated[tuple[Finding, ...], "what --fix did"] = ()
+    written: Annotated[str | None, As("file"), "where the result is written"] = None
     rules: tuple[str, ...] = field(default=(), repr=False)
     unread: tuple[Defect, ...] = ()
 
@@ -41,6 +58,7 @@ class Lint(Result, shown_as="lint"):
         )
 
     @property
+    @recorded(LintCounts)
     def counts(self) -> dict[str, int]:
         """How many findings are of each severity."""
         return {name: sum(each.severity == name for each in self.findings) for name in SEVERITIES}
@@ -49,16 +67,9 @@ class Lint(Result, shown_as="lint"):
         """Whether a finding is at least that bad; a file that cannot be read is."""
         return bool(self.unread) or any(each.rank >= SEVERITIES.index(severity) for each in self.findings)
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {
-            "files": list(self.files),
-            "findings": [each.to_dict() for each in self.findings],
-            "counts": self.counts,
-            "mended": [each.to_dict() for each in self.mended],
-            "file": self.written,
-            "unread": [{"file": each.file, "line": each.line, "message": each.text} for each in self.unread],
-        }
+    told_unread = Shown(
+        list[Unread], lambda self: [Unread(each.file, each.line, each.text) for each in self.unread], As("unread")
+    )
 
 
 def lint(

@@ -7,14 +7,13 @@ import math
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
+from typing import Annotated
 
 from ..analysis.observed import ObservedRobot
 from ..errors import HrsynthError
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
+from ..records import DEG, MM, As, Number, Shown
 from ..results import Value
 from ..simulation.ending import GOAL
 from ..simulation.endings.endings import RestSearch
@@ -28,7 +27,7 @@ class LoopEnds(Value):
     were not sought), and the certified radius; ``why`` something is not known, else empty. That there are no other
     rests is not said: they are found from random starts."""
 
-    others: tuple[str, ...] | None
+    others: Annotated[tuple[str, ...] | None, As("kinds")]
     radius: CertifiedRadius | None
     why: str = ""
 
@@ -67,16 +66,10 @@ class LoopEnds(Value):
         kinds = ", ".join(f"{count} {kind}" for kind, count in Counter(self.others).items())
         return kinds or "no other pose"
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        angle = None if self.radius is None else self.radius.angle
-        return {
-            "attracting": None if self.others is None else len(self.others),
-            "kinds": None if self.others is None else list(self.others),
-            "radius_mm": 1e3 * self.length if self.length else None,
-            "radius_deg": None if angle is None or not self.length else float(np.degrees(angle)),
-            "reason": self.why or None,
-        }
+    attracting = Shown(int | None, lambda self: None if self.others is None else len(self.others))
+    radius_mm = Shown(Number, lambda self: self.length or None, As(scale=MM))
+    radius_deg = Shown(Number, lambda self: self.radius.angle if self.length else None, As(scale=DEG))
+    reason = Shown(str | None, lambda self: self.why or None)
 
 
 def fewer_are_better(

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations, islice
-from typing import Any
+from typing import Annotated, NamedTuple, TypedDict
 
 import numpy as np
 
@@ -19,10 +19,10 @@ from ..analysis.asked import configurations_at
 from ..analysis.aspects.path import Aspects
 from ..analysis.aspects.words import SEPARATED
 from ..analysis.modes.modes import AssemblyModes, modes
-from ..analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
+from ..analysis.observed import UNLIMITED, CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ..analysis.posture import ConfigurationAnalysis, Posture
 from ..analysis.question import question
-from ..analysis.verdict import CONTROLLABLE, verdict_of
+from ..analysis.verdict import CONTROLLABLE, Word, verdict_of
 from ..budgets import AXIS_SEEN, SELECT_ROUNDS
 from ..errors import BadRequest, HrsynthError
 from ..geometry.vectors import Array
@@ -34,6 +34,7 @@ from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.pose import Pose, PoseLike, asked_pose
 from ..options import require_range
 from ..progress import part, tell
+from ..records import DEG, MM, As, Number, Record, Shown, recorded
 from ..results import Compared, Result, Value, by_name
 from ..simulation.camera import cylinders, place_camera
 from ..simulation.ending import GOAL
@@ -88,13 +89,13 @@ class Criteria:
 
 
 @dataclass(frozen=True)
-class ModeCount:
+class ModeCount(Record):
     """How many assembly modes, near ones too, there are with the directions of a pose, in how many of them the robot
     was found assembled, and whether these are proved to be all; ``why`` they are not listed, otherwise empty."""
 
-    count: int | None
-    reachable: int | None
-    complete: bool
+    count: Annotated[int | None, ""]
+    reachable: Annotated[int | None, ""]
+    complete: Annotated[bool, ""]
     why: str = ""
 
     @classmethod
@@ -103,21 +104,22 @@ class ModeCount:
         alike = (*found.modes, *found.near)
         return cls(len(alike), sum(mode.reachable is True for mode in alike), found.found.complete)
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {"count": self.count, "reachable": self.reachable, "complete": self.complete, "reason": self.why or None}
+    reason = Shown(str | None, lambda self: self.why or None)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Decision(Compared):
+class Decision(Compared, all_told=True):
     """A verdict in a word, and its reason."""
 
     verdict: str
     reason: str
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {"verdict": self.verdict, "reason": self.reason}
+
+class EndCounts(NamedTuple):
+    """The modes of the two ends; null if they were not requested."""
+
+    start: ModeCount | None
+    goal: ModeCount | None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -125,18 +127,18 @@ class Candidate(Value):
     """What is known about a set of legs; None for what was not computed, because the set was discarded before or was
     not ``examined``: then it is neither kept nor discarded."""
 
-    legs: tuple[str, ...]
-    verdict: str
-    discarded: str | None = None
+    legs: Annotated[tuple[str, ...], ""]
+    verdict: Annotated[str, Word]
+    discarded: Annotated[str | None, ""] = None
     errors: PoseErrors | None = None
-    seen: Mapping[str, float] | None = None
+    seen: Annotated[Mapping[str, float] | None, ""] = None
     """The least part of each of its legs that the camera sees at start and goal, after a run all along it."""
     start_modes: ModeCount | None = None
     goal_modes: ModeCount | None = None
-    aspect: Decision | None = None
-    ends: LoopEnds | None = None
-    run: Decision | None = None
-    examined: bool = True
+    aspect: Annotated[Decision | None, ""] = None
+    ends: Annotated[LoopEnds | None, As("endings")] = None
+    run: Annotated[Decision | None, ""] = None
+    examined: Annotated[bool, ""] = True
 
     @property
     def rank(self) -> tuple[float, ...]:
@@ -151,27 +153,26 @@ class Candidate(Value):
             return np.inf, np.inf, len(self.legs)
         return self.errors.position.largest, self.errors.orientation.largest, len(self.legs)
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        errors = self.errors
-        return {
-            "legs": list(self.legs),
-            "verdict": self.verdict,
-            "discarded": self.discarded,
-            "examined": self.examined,
-            "position_mm": errors and errors.position.to_dict(1e3)["largest"],
-            "position_gap": errors and errors.position.gap,
-            "orientation_deg": errors and errors.orientation.to_dict(180 / np.pi)["largest"],
-            "orientation_gap": errors and errors.orientation.gap,
-            "seen": None if self.seen is None else dict(self.seen),
-            "modes": {
-                "start": self.start_modes and self.start_modes.to_dict(),
-                "goal": self.goal_modes and self.goal_modes.to_dict(),
-            },
-            "aspect": self.aspect and self.aspect.to_dict(),
-            "endings": self.ends and self.ends.to_dict(),
-            "run": self.run and self.run.to_dict(),
-        }
+    position_mm = Shown(Number, lambda self: self.errors and self.errors.position.largest, As(scale=MM))
+    position_gap = Shown(Number, lambda self: self.errors and self.errors.position.gap)
+    orientation_deg = Shown(Number, lambda self: self.errors and self.errors.orientation.largest, As(scale=DEG))
+    orientation_gap = Shown(Number, lambda self: self.errors and self.errors.orientation.gap)
+    modes = Shown(EndCounts, lambda self: EndCounts(self.start_modes, self.goal_modes))
+
+
+class SightRecord(NamedTuple):
+    """A camera: the link that carries it, its pose in the link's frame, its focal length (pixels)."""
+
+    link: str
+    pose: Annotated[Array, list[list[float]]]
+    focal: float
+
+
+class Unexamined(TypedDict):
+    """How many sets were not examined, and why."""
+
+    count: int
+    reason: str | None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -179,10 +180,10 @@ class Selection(Result, shown_as="select"):
     """All sets of legs up to a size for one displacement: the kept ones by their ``rank``, those not examined, the most
     accurate at the goal first, then the discarded ones."""
 
-    setting: ObservedRobot
-    start: Pose
-    goal: Pose
-    candidates: tuple[Candidate, ...]
+    setting: Annotated[ObservedRobot, As(flat=True, without=("observed",))]
+    start: Annotated[Pose, As("from")]
+    goal: Annotated[Pose, As("to")]
+    candidates: Annotated[tuple[Candidate, ...], As("sets")]
     blur: Blur
     """How wrong each measurement may be."""
     sight: CameraView | None
@@ -206,37 +207,30 @@ class Selection(Result, shown_as="select"):
         return tuple(each for each in self.candidates if not each.examined)
 
     @property
+    @recorded()
     def fewer(self) -> str | None:
         """Why the best set serves better than one with more legs, None if that is not seen."""
         known = [(each.legs, each.ends) for each in self.kept if each.ends is not None]
         return fewer_are_better(known[0], known[1:]) if known and known[0][0] == self.kept[0].legs else None
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line, without the command's own fields."""
-        best = next(iter(self.kept), None)
+    @property
+    @recorded(As("cones"))
+    def told_cones(self) -> dict[str, float]:
+        """The half-angles of the cones by leg, in degrees."""
+        angles = np.degrees(self.blur.cones).tolist()
+        return {o.leg: cone for o, cone in zip(self.setting.observed, angles, strict=True) if cone}
+
+    @property
+    @recorded(As("sight"))
+    def told_sight(self) -> SightRecord | None:
+        """The camera; None where none was asked for."""
         eye = self.sight
-        camera = (
-            None
-            if eye is None
-            else {"link": eye.reference, "pose": eye.camera.place.tolist(), "focal": eye.camera.focal}
-        )
-        return {
-            "from": self.start.to_dict(),
-            "to": self.goal.to_dict(),
-            "camera": self.setting.mechanism.reference,
-            "cones": {
-                o.leg: float(np.degrees(cone))
-                for o, cone in zip(self.setting.observed, self.blur.cones, strict=True)
-                if cone
-            },
-            "noise": self.blur.amounts,
-            "sight": camera,
-            "best": None if best is None else list(best.legs),
-            "fewer": self.fewer,
-            "not_examined": {"count": len(self.unexamined), "reason": self.left},
-            "unlimited": list(self.setting.unlimited),
-            "sets": [each.to_dict() for each in self.candidates],
-        }
+        return None if eye is None else SightRecord(eye.reference, eye.camera.place, eye.camera.focal)
+
+    noise = Shown(dict[str, float], lambda self: self.blur.amounts, "by its unit (px, m, rad)")
+    best = Shown(list[str] | None, lambda self: self.kept[0].legs if self.kept else None)
+    not_examined = Shown(Unexamined, lambda self: {"count": len(self.unexamined), "reason": self.left})
+    unlimited = Shown(list[str], lambda self: self.setting.unlimited, UNLIMITED)
 
 
 @question(cones="cone")

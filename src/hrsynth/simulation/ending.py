@@ -4,6 +4,7 @@ lost from sight, time; or undecided."""
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from ..errors import HrsynthError
 from ..geometry.vectors import Array, pose_difference
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism.observations.direction import SeenAxis
+from ..records import As
 from ..results import Value
 from ..tolerances import DAMPED, NEAR_MODE, SAME_NEAR_POSE, SAME_RELATION
 from .law import Command, Measures
@@ -30,9 +32,9 @@ class Ending(Value):
     """How a run ended and why that is its name; ``matched`` is the number of the assembly mode, counted from 1 in the
     list of all modes of the goal's directions (None if it is none of them, or if they cannot be listed)."""
 
-    name: str
-    reason: str
-    matched: int | None = None
+    name: Annotated[str, As("ended")]
+    reason: Annotated[str, ""]
+    matched: Annotated[int | None, As("matched_mode")] = None
     modes: AssemblyModes | None = None
 
 

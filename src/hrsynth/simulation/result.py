@@ -2,57 +2,47 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Literal
 
 import numpy as np
 
-from ..analysis.observed import ObservedRobot
+from ..analysis.modes.assembly_mode import AssemblyMode
+from ..analysis.observed import UNLIMITED, ObservedRobot
 from ..geometry.so3 import angle_of
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism.noise import Noise
 from ..mechanism.pose import Pose
+from ..records import DEG, FLAT, MM, As, Record, Shown, recorded
 from ..results import Result
 from .ending import Ending
 from .law import Measures
 from .run import Run
-from .track import Track
+from .track import Track, TrackRecord
 
 ASIDE = 0.9
 """Part of the root mean square distance that a constant one makes up where noise holds a platform aside."""
 
 
 @dataclass(frozen=True)
-class Scatter:
+class Scatter(Record, all_told=True):
     """How far the platform was from the pose at which it settled, over the second half of a noisy run: metres and
     radians, largest and root mean square."""
 
-    metres: float
-    radians: float
-    rms_metres: float
-    rms_radians: float
+    metres: Annotated[float, As("position_mm", scale=MM)]
+    radians: Annotated[float, As("orientation_deg", scale=DEG)]
+    rms_metres: Annotated[float, As("rms_position_mm", scale=MM)]
+    rms_radians: Annotated[float, As("rms_orientation_deg", scale=DEG)]
     mean: tuple[float, float, float]
     """Where the platform was on average."""
-    offset: float
+    offset: Annotated[float, As("offset_mm", scale=MM)]
     """How far that is from the pose at which it settled (m): where noise does not average out."""
 
     @property
     def aside(self) -> bool:
         """Whether noise shifts the platform rather than shaking it."""
         return self.offset > ASIDE * self.rms_metres
-
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {
-            "position_mm": 1e3 * self.metres,
-            "orientation_deg": math.degrees(self.radians),
-            "rms_position_mm": 1e3 * self.rms_metres,
-            "rms_orientation_deg": math.degrees(self.rms_radians),
-            "offset_mm": 1e3 * self.offset,
-            "mean": list(self.mean),
-        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -63,22 +53,22 @@ class Servo(Result, shown_as="servo"):
     is how far the noisy run stayed from there.
     """
 
-    setting: ObservedRobot
-    start: Pose
-    goal: Pose
+    setting: Annotated[ObservedRobot, FLAT]
+    start: Annotated[Pose, As("from")]
+    goal: Annotated[Pose, As("to")]
     desired: Measures
-    gain: float
-    sense: str
+    gain: Annotated[float, ""]
+    sense: Annotated[str, Literal["exact", "edges", "pictures"]]
     noise: Noise | None
     run: Run
     track: Track
-    ending: Ending
-    depth: str
+    ending: Annotated[Ending, FLAT]
+    depth: Annotated[str, ""]
     settled: ClosedConfiguration
     target: ClosedConfiguration
     """The goal's configuration."""
-    spread: Scatter | None = None
-    notes: tuple[str, ...] = ()
+    spread: Annotated[Scatter | None, ""] = None
+    notes: Annotated[tuple[str, ...], ""] = ()
     """What a bench measured, in words."""
 
     def headline(self) -> str:
@@ -91,6 +81,7 @@ class Servo(Result, shown_as="servo"):
         return self.ending.name
 
     @property
+    @recorded()
     def pose(self) -> Pose:
         """The pose at which it ended."""
         return self.pose_of(self.settled)
@@ -134,27 +125,10 @@ class Servo(Result, shown_as="servo"):
         R = at.pose(motion.link)[:3, :3] @ self.target.pose(motion.link)[:3, :3].T
         return angle_of(R) if motion.body else 0.0
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line, without the command's own fields."""
-        found = self.ending
-        return {
-            **self.setting.to_dict(),
-            "from": self.start.to_dict(),
-            "to": self.goal.to_dict(),
-            "gain": self.gain,
-            "depth": self.depth,
-            "sense": self.sense,
-            "noise": None if self.noise is None else str(self.noise),
-            "ended": self.ended,
-            "reason": found.reason,
-            "pose": self.pose.to_dict(),
-            "matched_mode": found.matched,
-            "modes": None if found.modes is None else [each.to_dict() for each in found.modes.modes],
-            "type2": self.track.to_dict(self.run.times.tolist()),
-            "notes": list(self.notes),
-            "spread": None if self.spread is None else self.spread.to_dict(),
-            "unlimited": list(self.setting.unlimited),
-            "times": self.run.times.tolist(),
-            "error": self.errors.tolist(),
-            "poses": [self.pose_of(at).to_dict() for at in self.run.configurations],
-        }
+    told_noise = Shown(str | None, lambda self: self.noise and str(self.noise), As("noise"))
+    modes = Shown(list[AssemblyMode] | None, lambda self: self.ending.modes and self.ending.modes.modes)
+    type2 = Shown(TrackRecord, lambda self: self.track.timed(self.run.times))
+    unlimited = Shown(list[str], lambda self: self.setting.unlimited, UNLIMITED)
+    times = Shown(list[float], lambda self: self.run.times, "when (s)")
+    error = Shown(list[list[float]], lambda self: self.errors, "the error of each direction at each time")
+    poses = Shown(list[Pose], lambda self: [self.pose_of(at) for at in self.run.configurations])

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from ..geometry.vectors import Array
 from ..kinematics.chart import TangentChart
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.relation import Measurement
+from ..records import Number
 from ..results import Value
 from ..tolerances import DAMPED, INVERTED
 
@@ -37,6 +38,21 @@ class Passage:
     place: int
 
 
+class PassedRecord(NamedTuple):
+    """A singularity or limit that was passed, and when (s)."""
+
+    kind: str
+    time: float
+
+
+class TrackRecord(NamedTuple):
+    """The smallest singular value on the way, when (s) it was met, and what was passed."""
+
+    smallest: Number
+    at: Number
+    crossings: list[PassedRecord] | None
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Track(Value):
     """Smallest singular value of Mᵀ at each configuration (n,), NaN where Mᵀ does not exist, and the passages; None
@@ -49,17 +65,14 @@ class Track(Value):
         """The passages of one kind."""
         return tuple(each for each in self.passages or () if each.kind == kind)
 
-    def to_dict(self, times: Sequence[float]) -> dict[str, Any]:
-        """The record of the command line."""
-        seen = np.isfinite(self.smallest)
-        least = int(np.nanargmin(self.smallest)) if seen.any() else None
-        return {
-            "smallest": None if least is None else float(self.smallest[least]),
-            "at": None if least is None else times[least],
-            "crossings": None
-            if self.passages is None
-            else [{"kind": each.kind, "time": times[each.place]} for each in self.passages],
-        }
+    def timed(self, times: Array) -> TrackRecord:
+        """The same with the times (n,) of the configurations."""
+        passed = [PassedRecord(each.kind, times[each.place]) for each in self.passages or ()]
+        crossings = None if self.passages is None else passed
+        if not np.isfinite(self.smallest).any():
+            return TrackRecord(None, None, crossings)
+        least = int(np.nanargmin(self.smallest))
+        return TrackRecord(self.smallest[least], times[least], crossings)
 
 
 @dataclass(frozen=True, eq=False)

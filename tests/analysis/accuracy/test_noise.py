@@ -192,8 +192,8 @@ def test_cones_of_directions_are_their_noise(tmp_path: Path) -> None:
         hrsynth.accuracy(setting, **given).poses[0]
         for given in ({"noise": "1mm,0.1deg"}, {"noise": "1mm", "cone": "0.1deg"})
     )
-    assert one.position.to_dict(1) == other.position.to_dict(1)
-    assert one.orientation.to_dict(1) == other.orientation.to_dict(1)
+    assert one.position.to_dict() == other.position.to_dict()
+    assert one.orientation.to_dict() == other.orientation.to_dict()
 
 
 def test_a_grid_is_its_single_poses_and_leaves_out_what_is_behind_the_camera(tmp_path: Path) -> None:

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-import numpy as np
+from typing import Annotated, NamedTuple
 
 from ...budgets import LARGEST_FIELD, LARGEST_SWEEP
 from ...errors import BadRequest
@@ -16,10 +14,11 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism.noise import Noise
 from ...mechanism.pose import Grid, ModeNumber, Pose, PoseLike, as_pose, asked_poses
 from ...progress import tell
+from ...records import DEG, FLAT, As, Shown, recorded
 from ...results import Result
 from ...tolerances import LARGEST_FIRST_ORDER
 from ..asked import configurations_at
-from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
+from ..observed import UNLIMITED, CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ..question import question
 from ..verdict import verdict_of
 from .cones import IN_SIGHT, Blur, Cones, unseen
@@ -32,17 +31,32 @@ WORST = 3
 """Poses of a grid, those of the largest errors, at which the linear law is checked by samples."""
 
 
+class Cone(NamedTuple):
+    """A watched direction, and the half-angle of the cone about it."""
+
+    leg: str
+    link: str
+    cone_deg: Annotated[float, As(scale=DEG)]
+
+
+class SampledErrors(NamedTuple):
+    """The errors at a pose."""
+
+    errors: Annotated[PoseErrors, FLAT]
+    sampled: Sampled | None
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Accuracy(Result, shown_as="accuracy"):
     """The error maxima for cones about the observed directions, and for noise of other observations: at single poses,
     over a grid, and, if requested, what samples of true errors give (None otherwise)."""
 
-    setting: ObservedRobot
+    setting: Annotated[ObservedRobot, FLAT]
     blur: Blur
     poses: tuple[PoseErrors, ...]
     sampled: tuple[Sampled | None, ...]
-    field: ErrorMap | None
-    swept: SweptErrors | None = None
+    field: Annotated[ErrorMap | None, FLAT]
+    swept: Annotated[SweptErrors | None, FLAT] = None
     """What is in a file, where a grid was swept to one."""
 
     @property
@@ -68,33 +82,26 @@ class Accuracy(Result, shown_as="accuracy"):
         grid = [f"{count} poses of a grid" for count in reached]
         return f"{self.setting.headline()}: {'; '.join(worst + grid)}"
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line, without the command's own fields."""
-        poses = [
-            {
-                "pose": each.pose.to_dict(),
-                "position_mm": each.position.to_dict(1e3),
-                "orientation_deg": each.orientation.to_dict(180 / np.pi),
-                "beyond": list(each.beyond),
-                "sampled": true and true.to_dict(),
-            }
-            for each, true in zip(self.poses, self.sampled, strict=True)
-        ]
-        cones = [
-            {"leg": o.leg, "link": o.link, "cone_deg": float(np.degrees(cone))}
-            for o, cone in zip(self.setting.observed, self.cones, strict=True)
-            if cone
-        ]
-        noise = {"noise": self.blur.amounts, "exact": list(self.blur.exact(self.setting.observed))}
-        return {
-            **self.setting.to_dict(),
-            "cones": cones,
-            **noise,
-            **(self.field.to_dict() if self.field else {}),
-            **(self.swept.to_dict() if self.swept else {}),
-            "poses": poses,
-            "unlimited": list(self.setting.unlimited),
-        }
+    @property
+    @recorded(As("cones"))
+    def told_cones(self) -> list[Cone]:
+        """The cones about directions that have one."""
+        pairs = zip(self.setting.observed, self.cones, strict=True)
+        return [Cone(o.leg, o.link, cone) for o, cone in pairs if cone]
+
+    @property
+    @recorded(As("poses"))
+    def told_poses(self) -> list[SampledErrors]:
+        """The errors at single poses."""
+        return [SampledErrors(*each) for each in zip(self.poses, self.sampled, strict=True)]
+
+    noise = Shown(
+        dict[str, float],
+        lambda self: self.blur.amounts,
+        "by unit (px, m, rad), of observations that are not directions",
+    )
+    exact = Shown(list[str], lambda self: self.blur.exact(self.setting.observed), "observations without errors")
+    unlimited = Shown(list[str], lambda self: self.setting.unlimited, UNLIMITED)
 
 
 @question(cones="cone", samples="nonlinear")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +15,12 @@ from ...batch.grids import poses_over
 from ...batch.reach import grid_dependence, reach, sweep
 from ...budgets import LARGEST_GRID, POSES_FOR_NUMBA_ONCE
 from ...errors import BadRequest, Disagreement, HrsynthError, PlaneNotMet
-from ...geometry.vectors import Array, nested_lists
+from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement
 from ...mechanism.pose import Grid, Pose
 from ...progress import tell
+from ...records import DEG, FLAT, MM, As, Table
 from ...results import Value
 from ...tolerances import SAME_RELATION, USUAL_ERROR
 from ..observed import ObservedRobot
@@ -54,16 +55,12 @@ class Seen(Value):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Spots(Value):
+class Spots(Value, all_told=True):
     """Random poses of a grid at which Pinocchio's relation gave the same error maxima: how many, and the largest
     difference (relative)."""
 
-    count: int
+    count: Annotated[int, As("poses")]
     difference: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {"poses": self.count, "difference": self.difference}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -73,13 +70,13 @@ class ErrorMap(Value):
     same grid (values of its axes (n, ndim)); None where poses are found one by one. ``dependent`` says that parts of
     these poses depend on each other, where some are not reached."""
 
-    grid: Grid
-    reached: Flags
-    position: Array
-    orientation: Array
-    gap: float
+    grid: Annotated[Grid, FLAT]
+    reached: Annotated[Flags, Table]
+    position: Annotated[Array, Table, As("position_mm", scale=MM)]
+    orientation: Annotated[Array, Table, As("orientation_deg", scale=DEG)]
+    gap: Annotated[float, ""]
     seen: Seen
-    spots: Spots | None
+    spots: Annotated[Spots | None, As("checked")]
     smallest_at: Callable[[Array], Array] | None
     dependent: str | None = None
 
@@ -106,17 +103,6 @@ class ErrorMap(Value):
         flat = np.where(np.isfinite(errors), errors, -1.0).ravel()
         cells = [int(i) for i in np.argsort(-flat, kind="stable")[:count] if flat[i] > 0]
         return list(self.grid.poses_at([tuple(map(int, np.unravel_index(i, self.grid.shape))) for i in cells]))
-
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line: arrays nested in the order of ``axes``, null where not finite."""
-        return {
-            **self.grid.to_dict(),
-            "reached": self.reached.tolist(),
-            "position_mm": nested_lists(1e3 * self.position),
-            "orientation_deg": nested_lists(np.degrees(self.orientation)),
-            "gap": self.gap,
-            "checked": self.spots and self.spots.to_dict(),
-        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)

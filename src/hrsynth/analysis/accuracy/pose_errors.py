@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
@@ -18,7 +18,8 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.limits import outside
 from ...kinematics.relation import Measurement, relation
 from ...mechanism.pose import Pose
-from ...results import Value, finite
+from ...records import DEG, MM, SCALED, As, Number, recorded
+from ...results import Value
 from ...tolerances import FOLLOWED, INVERTED, RANK_CUTOFF
 from .cones import Blur
 
@@ -43,41 +44,31 @@ class ErrorEllipsoid(Value):
     None; where there are no errors both are zero and the directions are None.
     """
 
-    largest: float
-    direction: Array | None
-    least: float
-    least_direction: Array | None
+    largest: Annotated[float, Number, SCALED]
+    direction: Annotated[Array | None, list[float] | None]
+    least: Annotated[float, Number, SCALED]
+    least_direction: Annotated[Array | None, list[float] | None]
     errors: Array | None
-    gap: float = 0.0
+    gap: Annotated[float, "by how much it may be too large, relative to what is attained"] = 0.0
     single: bool = False
     """Whether there are errors in one direction only."""
 
     @property
+    @recorded()
     def anisotropy(self) -> float | None:
         """The largest error as multiple of the least; None where there is one direction only, or no finite error."""
         if self.direction is None or self.single or not np.isfinite(self.largest):
             return None
         return self.largest / self.least
 
-    def to_dict(self, unit: float) -> dict[str, Any]:
-        """The record of the command line, lengths or angles in another unit; null where infinite."""
-        return {
-            "largest": finite(unit * self.largest),
-            "direction": _nested(self.direction),
-            "least": finite(unit * self.least),
-            "least_direction": _nested(self.least_direction),
-            "anisotropy": self.anisotropy,
-            "gap": self.gap,
-        }
-
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PoseErrors(Value):
+class PoseErrors(Value, all_told=True):
     """The error maxima at a pose: position (m) and orientation (rad)."""
 
     pose: Pose
-    position: ErrorEllipsoid
-    orientation: ErrorEllipsoid
+    position: Annotated[ErrorEllipsoid, As("position_mm", scale=MM)]
+    orientation: Annotated[ErrorEllipsoid, As("orientation_deg", scale=DEG)]
     beyond: tuple[str, ...] = ()
     """The joints that are beyond their limits at the pose."""
 
@@ -246,7 +237,3 @@ def _descend(blocks: Array) -> Array:
         w = np.linalg.eigh(np.einsum("nk,kde->nde", 1 / np.maximum(sizes, floor), squares))[1][:, :, 0]
     w = np.concatenate([w, axes, views.T])
     return np.asarray(w[np.argmin(_width(blocks, w.T))])
-
-
-def _nested(vector: Array | None) -> list[float] | None:
-    return None if vector is None else vector.tolist()

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
 from ...geometry.vectors import Array
+from ...records import SCALED
 from ...results import Value
 
 
@@ -17,10 +18,10 @@ class ErrorRange(Value):
     """Errors in any number: the least and the largest of those that the first order bounds (None: there are none), how
     many are larger, how many infinite, and whether any is not zero."""
 
-    least: float | None = None
-    largest: float | None = None
-    loose: int = 0
-    infinite: int = 0
+    least: Annotated[float | None, SCALED] = None
+    largest: Annotated[float | None, SCALED] = None
+    loose: Annotated[int, "how many are larger"] = 0
+    infinite: Annotated[int, ""] = 0
     moves: bool = False
 
     @classmethod
@@ -44,14 +45,6 @@ class ErrorRange(Value):
             self.infinite + other.infinite,
             self.moves or other.moves,
         )
-
-    def to_dict(self, unit: float) -> dict[str, Any]:
-        """The record of the command line, errors in a unit."""
-        ends = {
-            name: value if value is None else unit * value
-            for name, value in (("least", self.least), ("largest", self.largest))
-        }
-        return {**ends, "loose": self.loose, "infinite": self.infinite}
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
@@ -17,44 +17,33 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.relation import Measurement
 from ...progress import tell
-from ...results import Value, finite
+from ...records import DEG, MM, As, Number
+from ...results import Value
 from .best_fit import ENDS, NOT_FOUND, best_fits, observed_values, weakest
 from .cones import Blur
 from .pose_errors import PoseErrors
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Sampled(Value):
+class Sampled(Value, all_told=True):
     """What the robot truly does with ``count`` errors on the cones' borders, the linearly worst ones first, each led
     there from none: the largest position (m) and orientation error (rad) met on these ways.
 
     ``ended`` holds the part of its error at which each best fit becomes flat that does; ``not_found`` counts those that
     the solver lost before. ``weakest`` is the smallest singular value of Mᵀ met, ``usual`` that at the pose."""
 
-    count: int
-    position: float
-    orientation: float
-    ended: tuple[float, ...]
+    count: Annotated[int, As("samples")]
+    position: Annotated[float, As("position_mm", scale=MM)]
+    orientation: Annotated[float, As("orientation_deg", scale=DEG)]
+    ended: Annotated[tuple[float, ...], As("ended_at")]
     not_found: int
-    weakest: float
-    usual: float
+    weakest: Annotated[float, Number, As("smallest_singular_value")]
+    usual: Annotated[float, Number, As("singular_value_at_pose")]
 
     @property
     def missed(self) -> int:
         """How many were not followed up to the whole error."""
         return len(self.ended) + self.not_found
-
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {
-            "samples": self.count,
-            "position_mm": 1e3 * self.position,
-            "orientation_deg": float(np.degrees(self.orientation)),
-            "ended_at": list(self.ended),
-            "not_found": self.not_found,
-            "smallest_singular_value": finite(self.weakest),
-            "singular_value_at_pose": finite(self.usual),
-        }
 
 
 def true_errors(

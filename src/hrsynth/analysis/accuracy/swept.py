@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from ...errors import BadRequest, BuildStopped, PlaneNotMet
 from ...geometry.vectors import Array
 from ...mechanism.pose import Grid
 from ...progress import tell
+from ...records import DEG, FLAT, MM, As, Shown, recorded
 from ...results import Value, content
 from ...tolerances import LARGEST_FIRST_ORDER
 from ...version import __version__
@@ -33,31 +34,36 @@ ROW = np.dtype([("position", "<f8"), ("orientation", "<f8")])
 """What the file holds of a pose: the errors (m, rad), NaN where it is not reached, infinite where a freedom is lost."""
 
 
+class SweptCounts(NamedTuple):
+    """Poses whose errors are in the file, how many of them are reached, and how many were there before from an
+    interrupted sweep."""
+
+    poses: int
+    reached: int
+    before: int
+    position_mm: Annotated[ErrorRange, As(scale=MM)]
+    orientation_deg: Annotated[ErrorRange, As(scale=DEG)]
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class SweptErrors(Value):
     """The error maxima over a grid in a file: an array of ``ROW`` in the grid's shape. ``before`` poses of it were
     there from a sweep that was broken off."""
 
-    grid: Grid
+    grid: Annotated[Grid, FLAT]
     file: Path
     tally: Tally
-    spots: Spots
+    spots: Annotated[Spots, Spots | None, As("checked")]
     before: int
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {
-            **self.grid.to_dict(),
-            "gap": self.tally.gap,
-            "checked": self.spots.to_dict(),
-            "swept": {
-                "poses": self.grid.size,
-                "reached": self.tally.reached,
-                "before": self.before,
-                "position_mm": self.tally.position.to_dict(1e3),
-                "orientation_deg": self.tally.orientation.to_dict(180 / np.pi),
-            },
-        }
+    gap = Shown(float, lambda self: self.tally.gap)
+
+    @property
+    @recorded(As("swept"))
+    def counts(self) -> SweptCounts:
+        """What is in the file."""
+        tally = self.tally
+        return SweptCounts(self.grid.size, tally.reached, self.before, tally.position, tally.orientation)
 
 
 def sweep_to(path: str | Path, mapper: Mapper, grid: Grid, seed: int) -> SweptErrors:

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
 from ...geometry.vectors import Array
 from ...mechanism import Mechanism
-from ...results import Result, Value, finite
+from ...records import As, Number, Shown, Table, recorded
+from ...results import Result, Value
 from .loops import LoopSystem
 
 KEPT, PASSED, OPEN, UNSEEN = "kept", "passed", "undecided", "not looked at"
 """What is proved of a limit over the cells."""
+BACK = "low and high of a box of all motors, no two of which give the platform one pose on the branch (proved)"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class BranchCell(Value):
+class BranchCell(Value, all_told=True):
     """A cell low ≤ q ≤ high (n,) of a part's motors, and the tube |x − centre − slopes (q − middle)| ≤ radius (p,) of
     its passive coordinates that contains exactly one closure for every q of the cell (m, rad).
 
@@ -27,13 +29,13 @@ class BranchCell(Value):
     the closure is proved to be the same.
     """
 
-    low: Array
-    high: Array
-    centre: Array
-    slopes: Array
-    radius: Array
-    weakest: float
-    neighbours: tuple[int, ...] = ()
+    low: Annotated[Array, list[float]]
+    high: Annotated[Array, list[float]]
+    centre: Annotated[Array, list[float]]
+    slopes: Annotated[Array, Table, "one row per passive coordinate, one column per motor"]
+    radius: Annotated[Array, list[float]]
+    weakest: Annotated[float, "a lower bound of the smallest singular value of the loops' Jacobian over the tube"]
+    neighbours: Annotated[tuple[int, ...], "cells with a common face, proved to hold the same closure there"] = ()
 
     @property
     def middle(self) -> Array:
@@ -48,42 +50,21 @@ class BranchCell(Value):
         """The middle of the tube (p,) for motor coordinates (n,): within ``radius`` of the closure."""
         return np.asarray(self.centre + self.slopes @ (q - self.middle))
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {
-            "low": self.low.tolist(),
-            "high": self.high.tolist(),
-            "centre": self.centre.tolist(),
-            "slopes": self.slopes.tolist(),
-            "radius": self.radius.tolist(),
-            "weakest": self.weakest,
-            "neighbours": list(self.neighbours),
-        }
-
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Toggle(Value):
+class Toggle(Value, all_told=True):
     """A place where the proof ends, found in floating point: motors ``q`` (n,) of a part at which, as far as numbers
     tell, the ``joints`` can move while all motors are held (a determinant vanishes); ``loops`` are those that they
     close. Without joints: no such place was found, and the proof was given up for its ``reason``."""
 
-    q: Array
+    q: Annotated[Array, list[float], As("motors")]
     joints: tuple[str, ...]
     loops: tuple[str, ...]
     reason: str
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {
-            "motors": self.q.tolist(),
-            "joints": list(self.joints),
-            "loops": list(self.loops),
-            "reason": self.reason,
-        }
-
 
 @dataclass(frozen=True)
-class BranchLimit(Value):
+class BranchLimit(Value, all_told=True):
     """A joint without a motor, its limits (m, rad; both None: the cone of a ball), its least and largest coordinate in
     the proved cells to a tube's radius (None if its loop is cut there), and the verdict: ``kept`` (proved), ``passed``
     (proved: beyond them somewhere in the cells), ``undecided``, ``not looked at``."""
@@ -91,26 +72,15 @@ class BranchLimit(Value):
     joint: str
     lower: float | None
     upper: float | None
-    least: float | None
+    least: Annotated[float | None, "null if its loop is cut there"]
     most: float | None
-    verdict: str
+    verdict: Annotated[str, Literal["kept", "passed", "undecided", "not looked at"], "kept and passed are proved"]
 
     @property
     def words(self) -> str:
         """The joint with its limits, and its range."""
         limits = self.joint if self.lower is None else f"{self.joint} {self.lower:.6g} to {self.upper:.6g}"
         return limits if self.least is None else f"{limits} (within {self.least:.4g} to {self.most:.4g})"
-
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {
-            "joint": self.joint,
-            "lower": finite(self.lower),
-            "upper": finite(self.upper),
-            "least": self.least,
-            "most": self.most,
-            "verdict": self.verdict,
-        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -121,20 +91,22 @@ class BranchPart(Value):
     box about the zero configuration that was found in their union. ``turns``: for each motor whose box is a whole turn
     proved from end to end, whether the closure at the end is that of the beginning."""
 
-    motors: tuple[str, ...]
-    passive: tuple[str, ...]
-    q0: Array
-    x0: Array
-    asked: tuple[Array, Array]
-    proved: tuple[Array, Array]
-    share: float
-    box_share: float
-    cells: tuple[BranchCell, ...]
-    toggles: tuple[Toggle, ...]
+    motors: Annotated[tuple[str, ...], ""]
+    passive: Annotated[tuple[str, ...], ""]
+    q0: Annotated[Array, list[float]]
+    x0: Annotated[Array, list[float]]
+    asked: Annotated[tuple[Array, Array], Table, "low and high of the requested box"]
+    proved: Annotated[
+        tuple[Array, Array], Table, "low and high of a box about the zero configuration in the union of the cells"
+    ]
+    share: Annotated[float, "volume of all cells, as a share of the box"]
+    box_share: Annotated[float, ""]
+    cells: Annotated[tuple[BranchCell, ...], ""]
+    toggles: Annotated[tuple[Toggle, ...], ""]
     turns: tuple[tuple[str, bool], ...]
-    closed_to: float
+    closed_to: Annotated[float, "bound of the equations left out (characteristic lengths, pure numbers)"]
     """Bound of the equations that were left out, over all tubes; 0 where they are proved to hold."""
-    redundant: str
+    redundant: Annotated[str, ""]
     """Why the equations that were left out hold; empty where none was."""
 
     @property
@@ -156,23 +128,22 @@ class BranchPart(Value):
         at = np.asarray(q, dtype=float)
         return next((cell for cell in self.cells if cell.holds(at)), None)
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {
-            "motors": list(self.motors),
-            "passive": list(self.passive),
-            "q0": self.q0.tolist(),
-            "x0": self.x0.tolist(),
-            "asked": [each.tolist() for each in self.asked],
-            "proved": [each.tolist() for each in self.proved],
-            "share": self.share,
-            "box_share": self.box_share,
-            "cells": [each.to_dict() for each in self.cells],
-            "toggles": [each.to_dict() for each in self.toggles],
-            "turns": dict(self.turns),
-            "closed_to": self.closed_to,
-            "redundant": self.redundant,
-        }
+    told_turns = Shown(
+        dict[str, bool],
+        lambda self: dict(self.turns),
+        As("turns"),
+        "whether the closure after a whole turn is that before it",
+    )
+
+
+class MotorBeyond(NamedTuple):
+    """A motor that the proved cells take beyond its limits in the file, these, and its range in the cells (m, rad)."""
+
+    motor: str
+    lower: Number
+    upper: Number
+    least: float
+    most: float
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -185,20 +156,20 @@ class BranchProof(Result, shown_as="branch"):
 
     robot: Mechanism
     system: LoopSystem
-    motors: tuple[str, ...]
-    passive: tuple[str, ...]
-    held: tuple[str, ...]
-    parts: tuple[BranchPart, ...]
-    back: tuple[Array, Array] | None
+    motors: Annotated[tuple[str, ...], ""]
+    passive: Annotated[tuple[str, ...], ""]
+    held: Annotated[tuple[str, ...], ""]
+    parts: Annotated[tuple[BranchPart, ...], ""]
+    back: Annotated[tuple[Array, Array] | None, Table | None, f"{BACK}; null without a proof"]
     """A box of all motors (m, rad), low and high (n,) each, about the zero configuration, in which no two are proved to
     give the platform one pose; None where there is no proof."""
-    regular: bool
+    regular: Annotated[bool, "whether the proved box has no Type 1 singularity (proved)"]
     """Whether no motors in the proved box are proved to be at a Type 1 singularity."""
-    box: str
+    box: Annotated[str, ""]
     """Where the box comes from: the file's limits, the caller, a default."""
-    tried: int
+    tried: Annotated[int, ""]
     """Cells that were tried."""
-    limits: tuple[BranchLimit, ...]
+    limits: Annotated[tuple[BranchLimit, ...], ""]
     """The limits of joints without a motor."""
 
     @property
@@ -236,12 +207,13 @@ class BranchProof(Result, shown_as="branch"):
         """The motors that the cells take beyond the file's limits, with these."""
         return [
             f"{name} {lower:.6g} to {upper:.6g} (within {low:.4g} to {high:.4g})"
-            for name, (lower, upper), (low, high) in self.beyond
+            for name, lower, upper, low, high in self.beyond
         ]
 
     @property
-    def beyond(self) -> list[tuple[str, tuple[float, float], tuple[float, float]]]:
-        """The motors that the cells take beyond the file's limits: their name, these, and from where to where."""
+    @recorded(As("motors_beyond"))
+    def beyond(self) -> list[MotorBeyond]:
+        """The motors that the cells take beyond the file's limits."""
         reach: dict[str, tuple[float, float]] = {}
         for part in (each for each in self.parts if each.cells):
             low = np.min([each.low for each in part.cells], axis=0)
@@ -249,7 +221,7 @@ class BranchProof(Result, shown_as="branch"):
             reach |= dict(zip(part.motors, zip(low.tolist(), high.tolist(), strict=True), strict=True))
         limited = self.robot.filed
         return [
-            (name, limited[name], (low, high))
+            MotorBeyond(name, *limited[name], low, high)
             for name, (low, high) in reach.items()
             if name in limited and (low < limited[name][0] or high > limited[name][1])
         ]
@@ -259,29 +231,3 @@ class BranchProof(Result, shown_as="branch"):
         return f"{self.robot.name}, {len(self.motors)} motors, {len(self.passive)} passive coordinates: " + "; ".join(
             f"{', '.join(each.motors)}: {each.percent} % of the box proved, {each.in_cells}" for each in self.parts
         )
-
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line, without the command's own fields."""
-        return {
-            "motors": list(self.motors),
-            "passive": list(self.passive),
-            "held": list(self.held),
-            "box": self.box,
-            "tried": self.tried,
-            "parts": [each.to_dict() for each in self.parts],
-            "back": None if self.back is None else [each.tolist() for each in self.back],
-            "regular": self.regular,
-            "limits": [each.to_dict() for each in self.limits],
-            "motors_beyond": [
-                {
-                    "motor": name,
-                    **{
-                        key: value if np.isfinite(value) else None
-                        for key, value in zip(("lower", "upper"), ends, strict=True)
-                    },
-                    "least": low,
-                    "most": high,
-                }
-                for name, ends, (low, high) in self.beyond
-            ],
-        }

@@ -107,9 +107,9 @@ def servo(found: Servo) -> str:
                 )
             )
     rows.append(("notes" if found.spread is None and found.notes else "", list(found.notes)))
-    least = track.to_dict(run.times.tolist())
-    if least["smallest"] is not None:
-        rows.append(("on the way", f"smallest singular value of Mᵀ {least['smallest']:.3g}, at {least['at']:.3g} s"))
+    smallest, at, _ = track.timed(run.times)
+    if smallest is not None:
+        rows.append(("on the way", f"smallest singular value of Mᵀ {smallest:.3g}, at {at:.3g} s"))
     rows += [
         (
             "",
@@ -119,7 +119,7 @@ def servo(found: Servo) -> str:
         for each in track.passages or ()
     ]
     if track.passages == ():
-        met = least["smallest"] is not None and least["smallest"] < DAMPED
+        met = smallest is not None and smallest < DAMPED
         rows.append(
             (
                 "",

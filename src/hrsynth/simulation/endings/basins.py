@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import chain
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -40,6 +40,7 @@ from ...kinematics.platform_motion import PlatformMotion
 from ...mechanism.pose import Grid, Pose, PoseLike, as_pose, asked_pose
 from ...processes import run_shared
 from ...progress import tell
+from ...records import FLAT, As, Number, Shown, Table, recorded
 from ...results import Result, Value
 from ...tolerances import RUNS_ALIKE, SEEN_ABOVE
 from ..ending import ENDINGS, GOAL, SIGHT, TIME, UNDECIDED, Ending, EndingClassifier
@@ -70,26 +71,24 @@ class BasinEnd(Value):
     come to rest at one pose; how many starts, and what share of all, end there; ``example`` is the pose of one of them,
     as ``servo`` takes it."""
 
-    ending: Ending
-    pose: Pose | None
+    ending: Annotated[Ending, FLAT]
+    pose: Annotated[Pose | None, ""]
     X: Array | None
     size: float
-    count: int
-    share: float
-    example: Pose
+    count: Annotated[int, As("starts")]
+    share: Annotated[float, ""]
+    example: Annotated[Pose, ""]
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {
-            "ended": self.ending.name,
-            "reason": self.ending.reason,
-            "matched_mode": self.ending.matched,
-            "pose": self.pose and self.pose.to_dict(),
-            "error": None if self.X is None else self.size,
-            "starts": self.count,
-            "share": self.share,
-            "example": self.example.to_dict(),
-        }
+    error = Shown(Number, lambda self: None if self.X is None else self.size, "‖e‖")
+
+
+class CertifiedPart(NamedTuple):
+    """The distance from the goal within which every start in its working mode is proved to end there, and what share of
+    the goal's basin among the starts that covers; the larger distance that holds as long as the law is not damped, if
+    there is one."""
+
+    radius: Annotated[CertifiedRadius, FLAT]
+    covered: float
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -99,21 +98,22 @@ class Basins(Result, shown_as="basins"):
     whether they were integrated together; ``followed`` of them were then simulated one by one because that could not
     continue, and of ``checked`` others ``agreed`` ended at the same pose."""
 
-    setting: ObservedRobot
-    goal: Pose
+    setting: Annotated[ObservedRobot, FLAT]
+    goal: Annotated[Pose, As("to")]
     target: ClosedConfiguration
     grid: Grid
-    ends: tuple[BasinEnd, ...]
-    cells: Places
+    ends: Annotated[tuple[BasinEnd, ...], ""]
+    cells: Annotated[Places, Table, "numbers of ``ends``, counted from 0, -1 where the robot cannot start"]
     damped: Flags
-    abreast: bool
-    followed: int = 0
-    checked: int = 0
-    agreed: int = 0
+    abreast: Annotated[bool, ""]
+    followed: Annotated[int, ""] = 0
+    checked: Annotated[int, ""] = 0
+    agreed: Annotated[int, ""] = 0
     certified: CertifiedRadius | None = None
     """From how far around the goal every start is proved to end there."""
 
     @property
+    @recorded()
     def starts(self) -> int:
         """At how many poses of the grid the robot can start."""
         return int(np.sum(self.cells != NOT_REACHED))
@@ -174,31 +174,15 @@ class Basins(Result, shown_as="basins"):
         share = next((each.share for each in self.ends if each.ending.name == GOAL), 0.0)
         return f"{self.setting.headline()}: {100 * share:.3g} % of {self.starts:,} starts end at the goal {self.goal}"
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line, without the command's own fields."""
-        return {
-            "to": self.goal.to_dict(),
-            **self.setting.to_dict(),
-            "poses": str(self.grid),
-            "axes": {name: values.tolist() for name, values in self.grid.axes},
-            "starts": self.starts,
-            "ends": [each.to_dict() for each in self.ends],
-            "cells": self.cells.tolist(),
-            "damped": int(np.sum(self.damped)),
-            "abreast": self.abreast,
-            "followed": self.followed,
-            "checked": self.checked,
-            "agreed": self.agreed,
-            "certified": {
-                "words": self.certified.words,
-                "radius_m": self.certified.length,
-                "radius_rad": self.certified.angle,
-                "covered": self.covered,
-                "undamped": self.certified.undamped_words,
-            }
-            if self.certified
-            else None,
-        }
+    poses = Shown(str, lambda self: str(self.grid))
+    axes = Shown(dict[str, list[float]], lambda self: dict(self.grid.axes))
+    told_damped = Shown(int, lambda self: np.sum(self.damped), As("damped"))
+
+    @property
+    @recorded(As("certified"))
+    def told_certified(self) -> CertifiedPart | None:
+        """What is certified; None where nothing was sought."""
+        return None if self.certified is None else CertifiedPart(self.certified, self.covered)
 
 
 @question()

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import chain
+from typing import Annotated
 
 import numpy as np
 
@@ -46,8 +47,8 @@ class Cover(Value):
 
     found: tuple[CriticalBox, ...]
     open: tuple[tuple[Array, Array], ...]
-    share: float
-    boxes: int
+    share: Annotated[float, "of the open boxes"]
+    boxes: Annotated[int, ""]
     bounded: bool
     reason: str = ""
     box: tuple[Array, Array] | None = None
@@ -60,7 +61,7 @@ class Cover(Value):
     locked: tuple[tuple[Array, Array], ...] = ()
     """Places (middle and half edges, in coordinates about the goal) at which equations of the legs may be dependent, so
     that legs lock each other: there it was not looked."""
-    unread: tuple[str, ...] = ()
+    unread: Annotated[tuple[str, ...], "legs at whose locked joints nothing was searched"] = ()
     """Legs in space with joints of which it is not known where they lock: there it was not looked."""
 
     loop: LoopError | SpringError | None = None

@@ -9,6 +9,7 @@ one a larger ball is proved, into which it leads (:mod:`.inward`).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from ...geometry.so3 import angle_of
 from ...geometry.vectors import Array, transform
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
+from ...records import As, recorded
 from ...results import Value
 from ...tolerances import AFFINE_ROUNDING, CERTIFIED_LEVEL, FOLLOWED, RADIUS_SHARES, RANK_CUTOFF, SAME_POINT
 from .cones import ConeProver, ProvedCones, prove_cones, proved_all_over
@@ -41,8 +43,8 @@ class CertifiedRadius(Value):
 
     goal: ClosedConfiguration
     motion: PlatformMotion
-    length: float
-    angle: float | None
+    length: Annotated[float, As("radius_m")]
+    angle: Annotated[float | None, As("radius_rad")]
     level: float
     least: float
     boxes: int
@@ -58,6 +60,7 @@ class CertifiedRadius(Value):
         return CERTIFIED if self.length > 0 else UNDECIDED
 
     @property
+    @recorded()
     def words(self) -> str:
         """From where every start ends at the goal."""
         if not self.length:
@@ -65,6 +68,7 @@ class CertifiedRadius(Value):
         return f"from anywhere {self._within(self.length, self.angle)}"
 
     @property
+    @recorded(As("undamped"))
     def undamped_words(self) -> str | None:
         """From where, as long as the law is not damped; None where that is not farther."""
         length = self.goal.twin.length * self.undamped

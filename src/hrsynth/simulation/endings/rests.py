@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from ...geometry.vectors import Array
 from ...kinematics.assembly import ASSEMBLED, BEYOND
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism.pose import Pose
+from ...records import FLAT, As, Number, Record, Shown, recorded
 from ...results import Result, Value
 from ...tolerances import SAME_ENDING
 from ..law import Measures
@@ -21,13 +22,14 @@ from .cover import Cover, join_boxes
 from .search import CriticalPoints
 
 CRITICAL = "critical"
+Stability = Literal["stable", "saddle", "unstable", "undecided"]
 STABLE, SADDLE, UNSTABLE, UNDECIDED = "stable", "saddle", "unstable", "undecided"
 MOST_JOINED, PLACES_TOLD = 5000, 4
 """Open boxes that are told place by place, at most, and how many places."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RestPoint:
+class RestPoint(Record):
     """A pose at which the loop rests: ``kind`` goal, mode, antipodal or critical (‖e‖ = ``error`` > 0 and no command),
     ``stability`` stable (it attracts), saddle, unstable (nothing is drawn to it) or undecided; ``curvatures`` are the
     eigenvalues of the Hessian of ½ ‖e‖² along the motions of the loops (characteristic lengths, radians), ascending.
@@ -46,69 +48,46 @@ class RestPoint:
     which it was found, ``met`` the number of starts that led to it.
     """
 
-    pose: Pose
-    kind: str
-    stability: str
-    error: float
-    curvatures: tuple[float, ...]
+    pose: Annotated[Pose, ""]
+    kind: Annotated[str, Literal["goal", "mode", "antipodal", "critical"]]
+    stability: Annotated[str, Stability]
+    error: Annotated[float, ""]
+    curvatures: Annotated[tuple[float, ...], "eigenvalues of the Hessian of ½ ‖e‖²"]
     configuration: ClosedConfiguration
-    shift: float = np.inf
-    turn: float = np.inf
-    decided: bool = False
-    rates: tuple[tuple[float, float], ...] = ()
-    side: str | None = None
-    reversed: tuple[str, ...] = ()
-    across: tuple[str, ...] = ()
-    singular: str | None = None
-    boundary: bool = False
-    beyond: tuple[str, ...] = ()
-    other_legs: tuple[str, ...] | None = None
-    met: int = 0
-    ways: int = 1
+    shift: Annotated[float, Number, As("radius_m")] = np.inf
+    turn: Annotated[float, Number, As("radius_rad")] = np.inf
+    decided: Annotated[bool, ""] = False
+    rates: Annotated[tuple[tuple[float, float], ...], "they enclose those of the linearised loop, times −1 / gain"] = ()
+    side: Annotated[str | None, Literal["goal", "other"] | None, "of the Type 2 locus"] = None
+    reversed: Annotated[tuple[str, ...], ""] = ()
+    across: Annotated[tuple[str, ...], ""] = ()
+    singular: Annotated[str | None, ""] = None
+    boundary: Annotated[bool, ""] = False
+    beyond: Annotated[tuple[str, ...], ""] = ()
+    other_legs: Annotated[tuple[str, ...] | None, ""] = None
+    met: Annotated[int, "how many starts led to it"] = 0
+    ways: Annotated[int, ""] = 1
 
     @property
+    @recorded()
     def proved(self) -> bool:
         """Whether it is enclosed."""
         return bool(np.isfinite(self.shift))
 
     @property
+    @recorded(Literal["yes", "beyond limits"])
     def assembly(self) -> str:
         """Whether the whole robot can be there."""
         return BEYOND if self.beyond else ASSEMBLED
 
     @property
+    @recorded()
     def stable(self) -> bool | None:
         """Whether it attracts; None if that is not decided."""
         return None if self.stability == UNDECIDED else self.stability == STABLE
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self.kind}, {self.stability}, {self.pose}>"
-
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {
-            "pose": self.pose.to_dict(),
-            "kind": self.kind,
-            "stable": self.stable,
-            "stability": self.stability,
-            "error": self.error,
-            "curvatures": list(self.curvatures),
-            "proved": self.proved,
-            "decided": self.decided,
-            "rates": [list(each) for each in self.rates],
-            "side": self.side,
-            "radius_m": self.shift if self.proved else None,
-            "radius_rad": self.turn if self.proved else None,
-            "reversed": list(self.reversed),
-            "across": list(self.across),
-            "singular": self.singular,
-            "boundary": self.boundary,
-            "assembly": self.assembly,
-            "beyond": list(self.beyond),
-            "other_legs": None if self.other_legs is None else list(self.other_legs),
-            "met": self.met,
-            "ways": self.ways,
-        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -118,12 +97,13 @@ class SignedModes(Value):
     prove, None if they prove nothing, in ``turns`` turns of a platform that translates (lists of modes cover that of
     the goal)."""
 
-    reversed: tuple[str, ...]
+    reversed: Annotated[tuple[str, ...], ""]
     listed: AssemblyModes | None
-    boxes: int | None = None
+    boxes: Annotated[int | None, ""] = None
     turns: int = 1
 
     @property
+    @recorded()
     def complete(self) -> bool:
         """Whether the list is proved to be all."""
         return self.boxes is not None or (self.listed is not None and self.listed.found.complete)
@@ -133,32 +113,33 @@ class SignedModes(Value):
         """Whether it is proved that there is no such pose."""
         return self.boxes == 0
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        known = self.listed
-        return {
-            "reversed": list(self.reversed),
-            "modes": self.boxes if known is None else len(known.modes),
-            "complex": None if known is None or known.found.continuum else known.found.complex,
-            "boxes": self.boxes,
-            "complete": self.complete,
-        }
+    modes = Shown(int | None, lambda self: self.boxes if self.listed is None else len(self.listed.modes))
+
+    @property
+    @recorded()
+    def complex(self) -> int | None:
+        """How many such poses there are, complex ones included; None where that is not known."""
+        return None if self.listed is None or self.listed.found.continuum else self.listed.found.complex
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class BoxedRest(Value):
+class BoxedRest(Value, all_told=True):
     """A pose about which boxes prove exactly one critical point of E, ‖e‖ in ``error``, that is no rest of the list:
     the robot was not closed there, or the command as it is computed does not vanish, as where joints lock or nearly
     do; so whether the loop rests there is not said. ``pose`` is that of the point alone from which boxes count if the
     platform's turn follows from it."""
 
     pose: Pose
-    stability: str
+    stability: Annotated[str, Stability]
     error: tuple[float, float]
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {"pose": self.pose.to_dict(), "stability": self.stability, "error": list(self.error)}
+
+class LockedPlace(NamedTuple):
+    """A place ``p`` (m) of the platform's point at which legs may lock each other; nothing was searched within this
+    distance of it."""
+
+    p: Annotated[Array, list[float]]
+    within_m: float
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -170,31 +151,35 @@ class RestCover(Value):
     rests of the list are at poses at which a platform that only translates is turned differently, which were not
     searched either, and ``apart`` rests of the list in all lie where nothing was searched."""
 
-    cover: Cover
-    alone: tuple[BoxedRest, ...]
-    strangers: int
-    within: float | None
-    shorter: float | None = None
-    turned: int = 0
-    apart: int = 0
+    cover: Annotated[Cover, FLAT]
+    alone: Annotated[tuple[BoxedRest, ...], ""]
+    strangers: Annotated[int, ""]
+    within: Annotated[float | None, As("within_m"), "of the goal, null if the legs bound the box"]
+    shorter: Annotated[float | None, As("shorter_m"), "null if no rod slides"] = None
+    turned: Annotated[int, ""] = 0
+    apart: Annotated[int, ""] = 0
 
     @property
+    @recorded()
     def crossings(self) -> int:
         """The number of points of a platform on struts at which rests fill curves, because two legs' joints lock."""
         return 0 if self.cover.struts is None else self.cover.struts.crossings
 
     @property
+    @recorded()
     def unstretched(self) -> tuple[str, ...] | None:
         """The legs that are not watched, if rests were searched for only while none of them is stretched; None if they
         were searched for everywhere."""
         return None if self.cover.loop is None else tuple(str(each.label) for each in self.cover.loop.idle)
 
     @property
+    @recorded()
     def across(self) -> int | None:
         """The number of watched directions at right angles to the desired ones at which rests were not searched for."""
         return None if self.cover.loop is None else self.cover.loop.flat
 
     @property
+    @recorded()
     def complete(self) -> bool:
         """Whether the list and what is told ``alone`` hold all rests in the box."""
         return self.cover.complete and not self.strangers
@@ -213,7 +198,8 @@ class RestCover(Value):
         return ""
 
     @property
-    def locked(self) -> tuple[tuple[Array, float], ...]:
+    @recorded()
+    def locked(self) -> tuple[LockedPlace, ...]:
         """The points (m) near which legs may lock each other, and the distance from them within which nothing was
         searched."""
         error = self.cover.error
@@ -221,7 +207,7 @@ class RestCover(Value):
             return ()
         k = error.shifts.shape[1]
         return tuple(
-            (self._point(middle[:k]), error.length * float(np.linalg.norm(half[:k])))
+            LockedPlace(self._point(middle[:k]), error.length * float(np.linalg.norm(half[:k])))
             for middle, half in self.cover.locked
         )
 
@@ -252,29 +238,10 @@ class RestCover(Value):
         assert error is not None
         return np.asarray(error.length * (error.p + error.shifts @ x))
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        cover = self.cover
-        return {
-            "complete": self.complete,
-            "proved": len(cover.found),
-            "boxes": cover.boxes,
-            "open": len(cover.open),
-            "share": cover.share,
-            "within_m": self.within,
-            "shorter_m": self.shorter,
-            "turns": len(cover.turns),
-            "turned": self.turned,
-            "apart": self.apart,
-            "crossings": self.crossings,
-            "locked": [{"p": list(p), "within_m": within} for p, within in self.locked],
-            "unread": list(cover.unread),
-            "unstretched": None if self.unstretched is None else list(self.unstretched),
-            "across": self.across,
-            "alone": [each.to_dict() for each in self.alone],
-            "strangers": self.strangers,
-            "reason": self.reason or None,
-        }
+    proved = Shown(int, lambda self: len(self.cover.found), "critical poses")
+    open = Shown(int, lambda self: len(self.cover.open), "boxes")
+    turns = Shown(int, lambda self: len(self.cover.turns), "of a platform that only translates")
+    told_reason = Shown(str | None, lambda self: self.reason or None, As("reason"))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -287,35 +254,39 @@ class Endings(Result, shown_as="endings"):
     depths in images; if it assumes them, ``curvatures`` are real parts of eigenvalues of the linearised loop over
     −gain."""
 
-    setting: ObservedRobot
+    setting: Annotated[ObservedRobot, FLAT]
     goal: ClosedConfiguration
-    pose: Pose
+    pose: Annotated[Pose, As("at")]
     desired: Measures
     rests: tuple[RestPoint, ...]
-    continua: tuple[RestPoint, ...]
-    lists: tuple[SignedModes, ...]
-    measured: tuple[str, ...]
+    continua: Annotated[tuple[RestPoint, ...], "one from each family that fills a curve or surface"]
+    lists: Annotated[tuple[SignedModes, ...], As("signs")]
+    measured: Annotated[tuple[str, ...], ""]
     search: CriticalPoints
-    cover: RestCover | None = None
-    depth: str = "exact"
+    cover: Annotated[RestCover | None, ""] = None
+    depth: Annotated[str, ""] = "exact"
 
     @property
+    @recorded()
     def complete(self) -> bool:
         """Whether these, and those that ``cover`` tells ``alone``, are proved to be all: in all working modes of the
         watched legs, within ``cover``'s box."""
         return self.cover is not None and self.cover.complete
 
     @property
+    @recorded()
     def starts(self) -> int:
         """How many starts were led to rests."""
         return self.search.starts
 
     @property
+    @recorded()
     def endings(self) -> tuple[RestPoint, ...]:
         """The rests at which all velocities are seen."""
         return tuple(each for each in self.rests if each.singular is None)
 
     @property
+    @recorded()
     def singular(self) -> tuple[RestPoint, ...]:
         """The rests of the damped law at which fewer velocities are seen: there the law without damping is not
         continuous."""
@@ -333,24 +304,9 @@ class Endings(Result, shown_as="endings"):
             f"{len(self.attracting)} of them attract"
         )
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line, without the command's own fields."""
-        return {
-            "at": self.pose.to_dict(),
-            **self.setting.to_dict(),
-            "complex": self.lists[0].to_dict()["complex"],
-            "depth": self.depth,
-            "complete": self.complete,
-            "cover": None if self.cover is None else self.cover.to_dict(),
-            "signs": [each.to_dict() for each in self.lists],
-            "proof": self.search.words,
-            "starts": self.starts,
-            "attracting": len(self.attracting),
-            "measured": list(self.measured),
-            "endings": [each.to_dict() for each in self.endings],
-            "singular": [each.to_dict() for each in self.singular],
-            "continua": [each.to_dict() for each in self.continua],
-        }
+    complex = Shown(int | None, lambda self: self.lists[0].complex)
+    proof = Shown(str, lambda self: self.search.words)
+    told_attracting = Shown(int, lambda self: len(self.attracting), As("attracting"))
 
 
 def stability(curvatures: Sequence[float] | Array, least: float = SAME_ENDING) -> str:
