@@ -17,7 +17,7 @@ LOCK = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generat
 	--no-annotate --custom-compile-command "make lock" $(LOCKFLAGS) pyproject.toml --group build
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all test-long fuzz adversary bounds endings files parroblib bench lint types robots readme catalog notebooks jupyter docs pictures lock three release setup setup-dev setup-all setup-browser clean
+.PHONY: help demo test test-all test-long fuzz adversary bounds endings files parroblib bench lint types index robots readme catalog notebooks jupyter docs pictures lock three release setup setup-dev setup-all setup-browser clean
 .DELETE_ON_ERROR:
 
 help:  ## this list
@@ -53,6 +53,9 @@ lint: setup-dev  ## style, import order and format
 types: setup-dev  ## type check
 	@$(BIN)/mypy
 	@$(BIN)/mypy --config-file tests/mypy.ini
+
+index: setup  ## what `import hrsynth` and the command line know of all analyses, from their declarations
+	@$(BIN)/python -c "from hrsynth.index import write; write()"
 
 robots: setup  ## regenerate robots/*.urdf from the families
 	@$(BIN)/python -m hrsynth.families

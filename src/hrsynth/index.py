@@ -1,4 +1,4 @@
-"""The index of the public functions, made of their declarations: ``python -m hrsynth.index`` writes ``index.json`` and
+"""The index of the public functions, made of their declarations: ``make index`` writes ``index.json`` and
 ``__init__.pyi`` anew.
 
 ``import hrsynth`` and the help of the command line read it instead of loading what computes.
@@ -63,7 +63,7 @@ def _told(option: Option) -> dict[str, Any]:
 
 def _read(told: dict[str, Any]) -> Option:
     """The option that was told."""
-    given = {name: tuple(value) if isinstance(value, list) else value for name, value in told.items()}
+    given: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in told.items()}
     given["kind"] = KINDS[given["kind"]]
     if given.pop("needed", False):
         given["default"] = NEEDED
@@ -95,13 +95,14 @@ def declared() -> dict[str, dict[str, Any]]:
 
 def index_text() -> str:
     """What ``index.json`` should hold."""
-    return json.dumps(declared(), ensure_ascii=False, indent=1) + "\n"
+    rows = [f'"{name}": {json.dumps(each, ensure_ascii=False)}' for name, each in declared().items()]
+    return "{\n" + ",\n".join(rows) + "\n}\n"
 
 
 def stub_text() -> str:
     """What ``__init__.pyi`` should hold: the public functions with their types, for editors and type checkers."""
     places = homes()
-    lines = ['"""Made by python -m hrsynth.index."""', "", "from . import catalog as catalog"]
+    lines = ['"""Made by make index."""', "", "from . import catalog as catalog"]
     lines += [
         f"from .{place} import {name} as {name}" for place, name in sorted((places[name], name) for name in places)
     ]
@@ -109,7 +110,8 @@ def stub_text() -> str:
     return "\n".join([*lines, "from .version import __version__ as __version__", "", f"__all__ = [\n{public}]", ""])
 
 
-if __name__ == "__main__":
+def write() -> None:
+    """Write both files anew."""
     INDEX.write_text(index_text(), encoding="utf-8")
     analyses.cache_clear()
     homes.cache_clear()

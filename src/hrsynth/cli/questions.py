@@ -93,9 +93,9 @@ class Question:
             for each, path in files.items():
                 if path is not None:
                     say(each.sentence(path))
-        for each in options(self.name):
-            if each.deprecated and values.get(each.name) is not None:
-                warn(f"{each.names[0]} is deprecated, {each.deprecated}")
+        for declared in options(self.name):
+            if declared.deprecated and values.get(declared.name) is not None:
+                warn(f"{declared.names[0]} is deprecated, {declared.deprecated}")
         found.require_answered(**values)
 
     def _given_options(self, function: Callable[..., Any], values: dict[str, Any]) -> dict[str, Any]:

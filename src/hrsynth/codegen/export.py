@@ -8,13 +8,23 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
 from ..analysis.branch.answer import BACK, BranchLimit, BranchProof
-from ..analysis.branch.proof import BoxLike, branch, parsed_box
-from ..analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, as_robot, as_texts
-from ..analysis.question import question
+from ..analysis.branch.proof import BoxLike, BoxOption, CellsOption, branch, parsed_box
+from ..analysis.observed import (
+    CameraLike,
+    CameraOption,
+    LegsLike,
+    ObservedRobot,
+    ObserveOption,
+    RobotLike,
+    as_robot,
+    as_texts,
+)
+from ..analysis.question import analysis
 from ..budgets import BRANCH_CELLS
 from ..errors import BadRequest, HrsynthError
 from ..geometry.vectors import Array
 from ..mechanism.observations.direction import Direction
+from ..options import option
 from ..progress import tell
 from ..records import Shown, Table, recorded
 from ..results import Result
@@ -100,17 +110,29 @@ class ExportedCode(Result, shown_as="export"):
         return [ExportedPart(each.motors, each.share, each.proved) for each in self.proof.parts]
 
 
-@question()
+@analysis(
+    150,
+    examples=(
+        "rrrrr_m1 --box shoulder_1=-0.1:0.1,shoulder_2=-0.1:0.1 -o five_bar.hpp",
+        "robot.urdf --lang numpy -o robot.py",
+    ),
+    seeded=False,
+)
 def export(
     robot: RobotLike,
-    lang: str = "c++",
-    box: BoxLike | None = None,
+    lang: Annotated[
+        str, option("c++ (one header, C++17, Eigen) or numpy (one module).", words=("c++", "numpy"))
+    ] = "c++",
+    box: BoxOption = None,
     *,
-    observe: LegsLike = None,
-    camera: CameraLike = None,
-    effort: int = BRANCH_CELLS,
+    observe: ObserveOption = None,
+    camera: CameraOption = None,
+    effort: CellsOption = BRANCH_CELLS,
 ) -> ExportedCode:
-    """A program for a controller, in C++ (one header, C++17, Eigen) or NumPy (one module): from the motors' coordinates
+    """Code for a controller: motors to passive joints and platform, Jacobians, and back, on the branch of the zero
+    configuration.
+
+    A program for a controller, in C++ (one header, C++17, Eigen) or NumPy (one module): from the motors' coordinates
     it computes the passive joints and the platform's pose on the branch of the zero configuration, their Jacobians, the
     motors for a pose, and the interaction matrix of the watched directions (``observe``, ``camera`` as for ``derive``).
 

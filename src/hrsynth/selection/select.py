@@ -19,22 +19,31 @@ from ..analysis.asked import configurations_at
 from ..analysis.aspects.path import Aspects
 from ..analysis.aspects.words import SEPARATED
 from ..analysis.modes.modes import AssemblyModes, modes
-from ..analysis.observed import UNLIMITED, CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
+from ..analysis.observed import (
+    UNLIMITED,
+    CameraOption,
+    NoiseOption,
+    ObservedRobot,
+    ObserveOption,
+    RobotLike,
+    SeedOption,
+    SeeOption,
+    StartOption,
+)
 from ..analysis.posture import ConfigurationAnalysis, Posture
-from ..analysis.question import question
-from ..analysis.verdict import CONTROLLABLE, Word, verdict_of
+from ..analysis.question import analysis
+from ..analysis.verdict import CONTROLLABLE, verdict_of
 from ..budgets import AXIS_SEEN, SELECT_ROUNDS
 from ..errors import BadRequest, HrsynthError
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.limits import outside
-from ..mechanism.noise import Noise
 from ..mechanism.observation import labels_of
 from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.pose import Pose, PoseLike, asked_pose
-from ..options import require_range
+from ..options import option, options_of, require_range
 from ..progress import part, tell
-from ..records import DEG, MM, As, Number, Record, Shown, recorded
+from ..records import DEG, MM, As, Number, Record, Shown, Word, recorded
 from ..results import Compared, Result, Value, by_name
 from ..simulation.camera import cylinders, place_camera
 from ..simulation.ending import GOAL
@@ -64,26 +73,49 @@ TYPES = {
 class Criteria:
     """The criteria of :func:`select`, which takes each of them by its name. Raises ``BadRequest``."""
 
-    size: int = 4
+    size: Annotated[int, option("Largest number of legs in a set.", low=1)] = 4
     """Legs of the largest sets."""
-    examine: int = 20
+    examine: Annotated[
+        int,
+        option("For how many sets, the most accurate first, to compute modes, aspects and runs.", low=1),
+    ] = 20
     """Sets, the most accurate first, of which modes and aspects are asked."""
-    runs: int = 3
+    runs: Annotated[int, option("How many sets, best first, must pass a simulated run.", low=0)] = 3
     """Sets that a simulated run is to lead to the goal."""
-    endings: int = 20
+    endings: Annotated[
+        int,
+        option(
+            "For how many of the examined sets, the most accurate first, to compute where else the loop may end.",
+            low=0,
+        ),
+    ] = 20
     """Sets, of those that are examined and the most accurate first, whose endings are sought."""
-    sight: str | None = None
+    sight: Annotated[
+        str | None,
+        option(
+            "Pose of the camera on the link that carries it (x right, y down, z ahead), such as "
+            "x=0,y=0,z=0.5,rpy=180deg/0/0; or auto.",
+            "POSE",
+        ),
+    ] = None
     """The pose of a camera on the link that carries it, or ``auto`` for one that sees all legs well."""
-    focal: float = FOCAL
+    focal: Annotated[float, option("Focal length of the camera, for pictures of 640 × 480 pixels.", "PIXELS")] = FOCAL
     """Its focal length (pixels)."""
-    seconds: float | None = None
+    seconds: Annotated[
+        float | None,
+        option(
+            "Deprecated, because the answer then depends on the machine: time after which no further set is examined.",
+            deprecated="what it leaves out depends on the machine: try --examine",
+        ),
+    ] = None
     """Deprecated, as what is examined then depends on the machine: time after which no further set is begun."""
 
     def __post_init__(self) -> None:
         if self.sight is None and self.focal != FOCAL:
             raise BadRequest("focal length without a camera", self.focal, "together with --sight")
-        for name in ("size", "runs", "endings", "examine"):
-            require_range("select", name, getattr(self, name), "an integer")
+        for each in options_of(Criteria):
+            if each.kind is int:
+                require_range(each.name, getattr(self, each.name), "an integer", each.low, each.high)
         if self.seconds is not None and not self.seconds > 0:
             raise BadRequest("seconds", self.seconds, "a positive number")
 
@@ -233,22 +265,35 @@ class Selection(Result, shown_as="select"):
     unlimited = Shown(list[str], lambda self: self.setting.unlimited, UNLIMITED)
 
 
-@question(cones="cone")
+@analysis(
+    140,
+    examples=("quattro --start x=0.1 --goal x=-0.05,phi=20deg",),
+    cones="cone",
+)
 @by_name(Criteria, "criteria")
 def select(
     robot: RobotLike,
-    camera: CameraLike = None,
+    camera: CameraOption = None,
     *,
-    observe: LegsLike = None,
-    see: SeeLike = None,
-    start: PoseLike,
-    goal: PoseLike,
-    cone: Cones | None = None,
-    noise: str | Noise | None = None,
+    observe: ObserveOption = None,
+    see: SeeOption = None,
+    start: StartOption,
+    goal: Annotated[PoseLike, option("Goal pose.", "POSE", old=("--to",))],
+    cone: Annotated[
+        Cones | None,
+        option(
+            "Half-angle of the cone about each direction, or one per leg: 1=0.1deg,2=0.2deg,… (default: 0.1deg).",
+            "ANGLE",
+        ),
+    ] = None,
+    noise: NoiseOption = None,
     criteria: Criteria,
-    seed: int = 0,
+    seed: SeedOption = 0,
 ) -> Selection:
-    """All sets of legs, or of what is observed, for the displacement from ``start`` to ``goal``, ranked by how many
+    """Which legs to watch for a motion from start to goal: all sets, ranked by where else the loop may end and by
+    accuracy, and why the others are discarded.
+
+    All sets of legs, or of what is observed, for the displacement from ``start`` to ``goal``, ranked by how many
     poses besides the goal were found to attract the loop, by the certified radius (radii within one power of two are
     equal), then by the largest position error at the goal for cones about the directions (``cone``: the half-angle for
     all, or one per leg, by default 0.1°; MMT A.2) and ``noise`` of other observations (as ``0.3px,1mm,0.1deg``).

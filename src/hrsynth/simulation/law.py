@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from ..kinematics.relation import Measurement
 from ..kinematics.steps import lead_to
 from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.sights import CameraObservation, depth_plane
-from ..options import plain_number
+from ..options import option, plain_number
 from ..results import Value
 from ..tolerances import DAMPED
 
@@ -42,6 +42,13 @@ Sense = Callable[[float, Poses, Measures], Measures]
 POSES = 24
 """Poses between start and goal at which the values of a trajectory are taken."""
 SUPPOSED = "exact, desired or constant:METRES"
+
+DepthOption = Annotated[
+    str,
+    option(
+        "Depths in images that the control law uses: exact, desired (those at the goal) or constant:METRES.", "DEPTH"
+    ),
+]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

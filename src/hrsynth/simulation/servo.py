@@ -5,15 +5,25 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
 from ..analysis.accuracy.accuracy import sees_all
 from ..analysis.accuracy.cones import IN_SIGHT
 from ..analysis.asked import configurations_at
-from ..analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
+from ..analysis.observed import (
+    POINTS,
+    CameraOption,
+    ObservedRobot,
+    ObserveOption,
+    RobotLike,
+    SeedOption,
+    SeeOption,
+    StartOption,
+)
 from ..analysis.posture import REGULAR, UNDECIDED, ConfigurationAnalysis
-from ..analysis.question import question
+from ..analysis.question import analysis
 from ..budgets import LONGEST_RUN, RUN_EVALUATIONS
 from ..errors import BadRequest, RankUndecided
 from ..geometry.so3 import angle_of
@@ -25,13 +35,14 @@ from ..mechanism.observation import Observation
 from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.observations.point import ImagePoint
 from ..mechanism.pose import PoseLike, asked_pose
+from ..options import option
 from ..progress import tell
 from ..results import by_name
 from ..tolerances import RANK_GAP, SEEN_ABOVE
 from .bench import Bench
 from .camera import Camera, Edges, cylinders, place_camera
 from .ending import EndingClassifier
-from .law import FixedDirections, Law, Sense, Trajectory, measure_all, straight, supposed_planes
+from .law import DepthOption, FixedDirections, Law, Sense, Trajectory, measure_all, straight, supposed_planes
 from .noise import Sensors, Shocks
 from .pictures import LegRenderer, Pictures, drawing, vision
 from .result import Scatter, Servo
@@ -62,28 +73,40 @@ LENGTHS, VALUES = ("lengths", " mm"), ("values", "")
 class Conditions:
     """How a robot is servoed; :func:`servo` takes each of these by its name. Raises ``BadRequest``."""
 
-    gain: float = GAIN
+    gain: Annotated[float, option("λ of the control law (1/s).", high=1e6)] = GAIN
     """λ of the control law (1/s)."""
-    sense: str = EXACT
+    sense: Annotated[
+        str,
+        option(
+            "How directions are sensed: exact, edges (of the legs in a camera's image) or pictures (rendered).",
+            "SENSE",
+            words=("exact", "edges", "pictures"),
+        ),
+    ] = EXACT
     """How what is observed is measured: ``exact`` (or with ``noise``, of directions in a cone about the true ones), of
     legs also ``edges`` (from those of the legs before a camera, their ends wrong by ``noise``) or ``pictures`` (from
     rendered ones)."""
-    noise: Noise | str | None = None
+    noise: Annotated[
+        Noise | str | None, option("Errors of measurements, such as 0.1deg, 0.3px (in images) or 1mm.", "AMOUNT")
+    ] = None
     """How wrong it is: angles as ``0.1deg``, what is found in a picture as ``0.3px``, lengths as ``1mm``; or several,
     as ``0.3px,1mm``."""
-    bias: bool = False
+    bias: Annotated[bool, option("Keep the error of each measurement constant.")] = False
     """Whether the errors of ``noise`` stay as they are at first."""
     lens: Camera | None = None
     """The camera of ``edges`` and ``pictures``, its pose in the link that carries it (default: where it sees all legs
     well)."""
-    physics: bool = False
+    physics: Annotated[bool, option("Drive a simulated mock-up with rods, masses and velocity servos.")] = False
     """Whether a mock-up in MuJoCo is driven, with dynamics."""
-    depth: str = "exact"
+    depth: DepthOption = "exact"
     """The depth of what is seen in images, as the law assumes it: ``exact``, ``desired`` (that at the goal) or
     ``constant:0.5`` (m)."""
-    duration: float | None = None
+    duration: Annotated[
+        float | None,
+        option("Move the desired measurements along the straight line in this time (default: at once).", "SECONDS"),
+    ] = None
     """Leads the desired values along the straight way of poses in so many seconds instead of at once."""
-    time: float | None = None
+    time: Annotated[float | None, option("Longest duration of the run.", "SECONDS")] = None
     """Longest run (s)."""
 
     def __post_init__(self) -> None:
@@ -130,20 +153,29 @@ class Conditions:
         return self.time or (self.duration or 0.0) + lasts / self.gain
 
 
-@question()
+@analysis(
+    100,
+    examples=(
+        "quattro --observe 1,4 --start x=0.1 --goal x=-0.05 -o run.png",
+        "delta --start x=0 --goal x=0.05 --noise 0.1deg --json",
+        f"gough_stewart {POINTS} --start x=0.02 --goal x=0",
+    ),
+)
 @by_name(Conditions, "conditions")
 def servo(
     robot: RobotLike,
-    observe: LegsLike = None,
-    camera: CameraLike = None,
+    observe: ObserveOption = None,
+    camera: CameraOption = None,
     *,
-    see: SeeLike = None,
-    start: PoseLike,
-    goal: PoseLike,
+    see: SeeOption = None,
+    start: StartOption,
+    goal: Annotated[PoseLike, option("Pose whose measurements are desired.", "POSE", old=("--to",))],
     conditions: Conditions,
-    seed: int = 0,
+    seed: SeedOption = 0,
 ) -> Servo:
-    """The servo loop of MMT 2.3 from the pose ``start`` towards what is measured at ``goal``.
+    """A simulated servo run on what is observed: where it ends, and what it passes on the way.
+
+    The servo loop of MMT 2.3 from the pose ``start`` towards what is measured at ``goal``.
 
     ``observe``, ``camera`` and ``see`` are as for ``derive``; each kind of observation has its error. The fields of
     :class:`Conditions` can be given by their names: ``gain``, ``sense``, ``noise``, ``bias``, ``lens``, ``physics``,

@@ -11,15 +11,25 @@ from ...budgets import LARGEST_FIELD, LARGEST_SWEEP
 from ...errors import BadRequest
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
-from ...mechanism.noise import Noise
 from ...mechanism.pose import Grid, ModeNumber, Pose, PoseLike, as_pose, asked_poses
+from ...options import option
 from ...progress import tell
 from ...records import DEG, FLAT, As, Shown, recorded
 from ...results import Result
 from ...tolerances import LARGEST_FIRST_ORDER
 from ..asked import configurations_at
-from ..observed import UNLIMITED, CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
-from ..question import question
+from ..observed import (
+    POSES,
+    UNLIMITED,
+    CameraOption,
+    NoiseOption,
+    ObservedRobot,
+    ObserveOption,
+    RobotLike,
+    SeedOption,
+    SeeOption,
+)
+from ..question import analysis
 from ..verdict import verdict_of
 from .cones import IN_SIGHT, Blur, Cones, unseen
 from .error_map import ErrorMap, Mapper
@@ -104,24 +114,56 @@ class Accuracy(Result, shown_as="accuracy"):
     unlimited = Shown(list[str], lambda self: self.setting.unlimited, UNLIMITED)
 
 
-@question(cones="cone", samples="nonlinear")
+@analysis(
+    130,
+    examples=(
+        "delta --cone 0.1deg --at x=0.1",
+        "delta --cone 0.1deg --plane z=-0.6 -o map.png",
+    ),
+    cones="cone",
+    samples="nonlinear",
+)
 def accuracy(
     robot: RobotLike,
-    observe: LegsLike = None,
-    camera: CameraLike = None,
+    observe: ObserveOption = None,
+    camera: CameraOption = None,
     *,
-    see: SeeLike = None,
-    cone: Cones | None = None,
-    noise: str | Noise | None = None,
-    at: PoseLike | Iterable[PoseLike] = (),
-    plane: PoseLike | None = None,
-    grid: Grid | str | None = None,
-    steps: int | None = None,
-    nonlinear: int = 0,
+    see: SeeOption = None,
+    cone: Annotated[
+        Cones | None,
+        option(
+            "Half-angle of the cone about each observed direction, such as 0.1deg; or one per leg: 1=0.1deg,2=0.2deg.",
+            "ANGLE",
+        ),
+    ] = None,
+    noise: NoiseOption = None,
+    at: Annotated[
+        PoseLike | Iterable[PoseLike],
+        option(f"A pose, such as x=0.02,y=0.1,z=-0.7; {POSES}", "POSE", kind=list[str]),
+    ] = (),
+    plane: Annotated[
+        PoseLike | None, option("Plane of poses, such as z=-0.7, as far as it is reached.", "PART=VALUE")
+    ] = None,
+    grid: Annotated[
+        Grid | str | None,
+        option("A line, plane or box of poses, such as x=-0.3:0.3:21,y=0,z=-0.7 (from:to:count).", "GRID"),
+    ] = None,
+    steps: Annotated[int | None, option("Poses along each side of the plane.", low=5, high=300)] = None,
+    nonlinear: Annotated[
+        int,
+        option(
+            "Try this many errors (at least the worst to first order) at each pose; on a "
+            "plane or grid, at its worst poses.",
+            "COUNT",
+            low=0,
+        ),
+    ] = 0,
     into: str | Path | None = None,
-    seed: int = 0,
+    seed: SeedOption = 0,
 ) -> Accuracy:
-    """The largest position and orientation error of the platform over all errors of what is observed, to first order
+    """How far the platform can be off if what is observed is off by given amounts.
+
+    The largest position and orientation error of the platform over all errors of what is observed, to first order
     (docs/pages/theory.md, section 10; MMT A.1): max over unit w of Σ ψ_i ‖(J_i P_i)ᵀ w‖, J = M^{T+}.
 
     ``cone`` is the half-angle of the cones about directions, one for all legs or one per leg; ``noise`` gives the

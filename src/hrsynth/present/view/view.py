@@ -5,19 +5,28 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from ...analysis.derive import Derivation, derive
-from ...analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
-from ...analysis.question import question
+from ...analysis.observed import (
+    POINTS,
+    CameraOption,
+    ObservedRobot,
+    ObserveOption,
+    RobotLike,
+    SeedOption,
+    SeeOption,
+)
+from ...analysis.question import analysis
 from ...geometry.vectors import Array, orient_axis
 from ...kinematics.coordinates import Coordinates
 from ...kinematics.platform_motion import PlatformMotion
 from ...mechanism import Mechanism
 from ...mechanism.observation import Observation
 from ...mechanism.observations.direction import Direction
+from ...options import option
 from ...progress import tell
 from ...results import Result, Value
 from ..outputs import OUTPUTS, function
@@ -140,17 +149,26 @@ class View(Result, shown_as="view"):
         }
 
 
-@question()
+@analysis(
+    160,
+    examples=(
+        "quattro --observe 1,4 --hidden",
+        "quattro --observe 1,4 --static quattro.html",
+        f"gough_stewart {POINTS} --static points.html",
+    ),
+)
 def view(
     robot: RobotLike,
-    observe: LegsLike = None,
-    camera: CameraLike = None,
+    observe: ObserveOption = None,
+    camera: CameraOption = None,
     *,
-    see: SeeLike = None,
-    hidden: bool = False,
-    seed: int = 0,
+    see: SeeOption = None,
+    hidden: Annotated[bool, option("Show the hidden robot too, its virtual actuators highlighted.")] = False,
+    seed: SeedOption = 0,
 ) -> View:
-    """A 3D view of a robot, with ``hidden`` also of its hidden robot: every position of a slider is a closed
+    """A 3D view in the browser: sliders that keep the loops closed, what is observed, assembly modes.
+
+    A 3D view of a robot, with ``hidden`` also of its hidden robot: every position of a slider is a closed
     configuration in which only one of the platform's coordinates differs from the zero configuration.
 
     ``observe``, ``camera`` and ``see`` are as for ``derive``, which also says what is raised. Assembly modes that

@@ -16,8 +16,16 @@ import numpy as np
 from ...analysis.accuracy.cones import Blur
 from ...analysis.accuracy.error_map import Mapper
 from ...analysis.asked import configurations_at
-from ...analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
-from ...analysis.question import question
+from ...analysis.observed import (
+    CameraOption,
+    JobsOption,
+    ObservedRobot,
+    ObserveOption,
+    RobotLike,
+    SeedOption,
+    SeeOption,
+)
+from ...analysis.question import analysis
 from ...batch.grids import poses_over
 from ...batch.reach import sweep
 from ...budgets import (
@@ -38,13 +46,14 @@ from ...geometry.vectors import Array, pose_difference
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...mechanism.pose import Grid, Pose, PoseLike, as_pose, asked_pose
+from ...options import option
 from ...processes import run_shared
 from ...progress import tell
 from ...records import FLAT, As, Number, Shown, Table, recorded
 from ...results import Result, Value
 from ...tolerances import RUNS_ALIKE, SEEN_ABOVE
 from ..ending import ENDINGS, GOAL, SIGHT, TIME, UNDECIDED, Ending, EndingClassifier
-from ..law import measure_all
+from ..law import DepthOption, measure_all
 from ..run import AWAY, EFFORT, LOST, POISED, REST, SERVED_AT
 from ..run import TIME as OVER
 from ..servo import Conditions, ServoTask
@@ -185,22 +194,43 @@ class Basins(Result, shown_as="basins"):
         return None if self.certified is None else CertifiedPart(self.certified, self.covered)
 
 
-@question()
+@analysis(
+    120,
+    examples=(
+        "quattro --observe 1,4 --to z=-0.7 --plane z=-0.7,phi=0 -o basins.png",
+        "3rrr_m1 --to x=0,y=0,phi=0 --grid x=-0.1:0.1:50,y=0,phi=0",
+    ),
+)
 def basins(
     robot: RobotLike,
-    observe: LegsLike = None,
-    camera: CameraLike = None,
+    observe: ObserveOption = None,
+    camera: CameraOption = None,
     *,
-    see: SeeLike = None,
-    to: PoseLike,
-    plane: PoseLike | None = None,
-    grid: str | None = None,
-    steps: int | None = None,
-    jobs: int | None = None,
-    depth: str = "exact",
-    seed: int = 0,
+    see: SeeOption = None,
+    to: Annotated[PoseLike, option("Pose whose measurements are desired.", "POSE")],
+    plane: Annotated[
+        PoseLike | None,
+        option(
+            "Plane of starts, such as z=-0.7, as far as it is reached (default: one through the goal).", "PART=VALUE"
+        ),
+    ] = None,
+    grid: Annotated[
+        str | None,
+        option("A line, plane or box of starts, such as x=-0.3:0.3:50,y=-0.3:0.3:50,z=-0.7 (from:to:count).", "GRID"),
+    ] = None,
+    steps: Annotated[
+        int | None,
+        option(
+            "Starts along each side of the plane (default: 100; 15 if each is simulated separately).", low=2, high=300
+        ),
+    ] = None,
+    jobs: JobsOption = None,
+    depth: DepthOption = "exact",
+    seed: SeedOption = 0,
 ) -> Basins:
-    """Where the loop ends that servoes what is observed at the pose ``to``, from each start of a plane of poses (by
+    """Where the servo loop to a goal ends, from each start of a line, plane or box of poses.
+
+    Where the loop ends that servoes what is observed at the pose ``to``, from each start of a plane of poses (by
     default one through the goal, as far as it is reached, ``steps`` poses a side) or of a ``grid``, a line, plane or
     box such as ``x=-0.3:0.3:50,y=-0.3:0.3:50,z=-0.7``.
 

@@ -7,6 +7,7 @@ import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +20,17 @@ from ...analysis.aspects.vector_expressions import NoLegForm
 from ...analysis.branch.carried_vectors import SweptChains
 from ...analysis.measured import MeasuredRobot
 from ...analysis.modes.modes import AssemblyModes, modes
-from ...analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
+from ...analysis.observed import (
+    CameraOption,
+    JobsOption,
+    ObservedRobot,
+    ObserveOption,
+    RobotLike,
+    SeedOption,
+    SeeOption,
+)
 from ...analysis.posture import ConfigurationAnalysis
-from ...analysis.question import question
+from ...analysis.question import analysis
 from ...budgets import COVER_BOXES
 from ...constraints.condition import Condition
 from ...constraints.pattern import ConstraintPattern, placing_links
@@ -33,10 +42,11 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.limits import outside
 from ...mechanism.observations.direction import SeenAxis
 from ...mechanism.pose import PoseLike, asked_pose
+from ...options import option
 from ...progress import tell
 from ...tolerances import CRITICAL_FLAT, DAMPED, SAME_ENDING, SEEN_ABOVE, VANISHED
 from ..ending import ANTIPODAL, BOUNDARY, GOAL, MODE, rest
-from ..law import FixedDirections, Law, Measures, measure_all, supposed_planes
+from ..law import DepthOption, FixedDirections, Law, Measures, measure_all, supposed_planes
 from ..servo import require_regular, require_seen, require_sight
 from .completeness import Covers
 from .critical_poses import Further, Lift, critical_poses
@@ -54,21 +64,39 @@ NEARBY = 0.02
 """Step (characteristic lengths, radians) of the first of these walks."""
 
 
-@question()
+@analysis(
+    110,
+    examples=(
+        "3rrr_m1 --at x=0.02,y=0,phi=10deg",
+        "quattro --observe 1,4 --at x=0.05,y=0.1,z=-0.7 -o endings.png",
+    ),
+)
 def endings(
     robot: RobotLike,
-    observe: LegsLike = None,
-    camera: CameraLike = None,
+    observe: ObserveOption = None,
+    camera: CameraOption = None,
     *,
-    see: SeeLike = None,
-    at: PoseLike | None = None,
-    depth: str = "exact",
-    complete: bool = False,
-    effort: int = COVER_BOXES,
-    jobs: int | None = None,
-    seed: int = 0,
+    see: SeeOption = None,
+    at: Annotated[
+        PoseLike | None,
+        option(
+            "The goal: pose whose measurements are desired, such as x=0.02,y=0.1,z=-0.7; or mode:2 "
+            "(default: the zero configuration).",
+            "POSE",
+        ),
+    ] = None,
+    depth: DepthOption = "exact",
+    complete: Annotated[bool, option("Try to prove that the list is complete, by boxes of platform poses.")] = False,
+    effort: Annotated[
+        int, option("Most boxes of poses to look at (10,000 to 40,000 take a second).", "COUNT", low=1)
+    ] = COVER_BOXES,
+    jobs: JobsOption = None,
+    seed: SeedOption = 0,
 ) -> Endings:
-    """Poses at which the loop can rest that servoes what is observed at ``at`` (default: the zero configuration): the
+    """Poses at which the servo loop can rest, and which of them attract: the goal, modes, antipodal poses,
+    critical poses of the error.
+
+    Poses at which the loop can rest that servoes what is observed at ``at`` (default: the zero configuration): the
     goal, modes and antipodal poses, where the error vanishes, and critical poses, where it does not; and which of them
     attract.
 
