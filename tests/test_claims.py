@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from hrsynth.index import analyses
 from tables import claims
 from tables.claims import CERTAIN, CLAIMS, NO_CLAIMS
 
@@ -24,6 +25,7 @@ def texts() -> tuple[tuple[str, str], ...]:
     found = []
     for file in sorted(PACKAGE.rglob("*.py")):
         found += [(f"{file.relative_to(ROOT)}:{line}", text) for line, text in strings(file.read_text("utf-8"))]
+    found += [(f"hrsynth {name} -h", each["help"]) for name, each in analyses().items()]
     for ending in ("html", "j2", "js"):
         for file in sorted(PACKAGE.rglob(f"*.{ending}")):
             if not file.name.endswith(".min.js"):  # a library of others

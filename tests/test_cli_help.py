@@ -19,10 +19,10 @@ import pytest
 import hrsynth
 from hrsynth.cli import app, execute
 from hrsynth.cli.completion import candidates
-from hrsynth.cli.options import OUTPUT, READING, WATCHING
 from hrsynth.cli.questions import QUESTIONS
 from hrsynth.description import shipped
 from hrsynth.errors import MissingExtra
+from hrsynth.options import OUTPUT, READING, WATCHING
 
 ROOT: Any = app
 LEAVES = [(name,) for name, each in ROOT.commands.items() if not hasattr(each, "commands")] + [

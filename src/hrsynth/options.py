@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from inspect import Parameter, signature
+from inspect import Parameter, Signature, signature
 from types import NoneType, SimpleNamespace
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
@@ -111,11 +111,10 @@ def options_of(function: Callable[..., Any]) -> Iterator[Option]:
     place = vars(sys.modules[function.__module__])
     for name, parameter in signature(function).parameters.items():
         hint, *extras = _annotated(parameter.annotation, place)
-        for each in extras:
-            if isinstance(each, Option):
-                default = NEEDED if parameter.default is Parameter.empty else parameter.default
-                kind = _kind(hint) if each.kind is str else each.kind
-                yield replace(each, name=name, kind=kind, default=None if default == () else default)
+        for each in [each for each in extras if isinstance(each, Option)][-1:]:
+            default = NEEDED if parameter.default is Parameter.empty else parameter.default
+            kind = _kind(hint) if each.kind is str else each.kind
+            yield replace(each, name=name, kind=kind, default=None if default == () else default)
 
 
 def kinds_of(function: Callable[..., Any]) -> dict[str, list[str]]:
@@ -127,6 +126,18 @@ def kinds_of(function: Callable[..., Any]) -> dict[str, list[str]]:
         parts = hint.split(" | ") if isinstance(hint, str) else get_args(hint) or (hint,)
         found[name] = ["None" if each is NoneType else getattr(each, "__name__", str(each)) for each in parts]
     return found
+
+
+def plain_signature(function: Callable[..., Any]) -> Signature:
+    """A function's signature without what annotates its types."""
+    known = signature(function)
+    plain = [
+        each.replace(annotation=str(each.annotation).removeprefix("Annotated[").partition(",")[0].strip())
+        if str(each.annotation).startswith("Annotated[")
+        else each
+        for each in known.parameters.values()
+    ]
+    return known.replace(parameters=plain)
 
 
 def _annotated(annotation: Any, place: dict[str, Any]) -> tuple[Any, ...]:

@@ -14,8 +14,9 @@ import pytest
 
 import hrsynth
 from hrsynth import load
-from hrsynth.cli import execute
-from hrsynth.cli.questions import QUESTIONS
+from hrsynth.cli import app, execute
+from hrsynth.cli.options import JSON, SOURCE
+from hrsynth.cli.questions import FIGURE, QUESTIONS
 from hrsynth.errors import BadRequest
 from hrsynth.present.outputs import OUTPUTS, function
 from hrsynth.results import Result
@@ -73,11 +74,13 @@ def test_each_option_goes_somewhere(question):
         *signature(getattr(hrsynth, question.name)).parameters,
         *(file.option for file in files),
         *(name for file in files for name in file.takes),
+        *(option.name for option in (*SOURCE, *FIGURE, JSON)),
     }
-    for extra in (question.shows, question.after):
-        known |= set() if extra is None else set(signature(extra).parameters)
-    assert {option.name for option in question.options} <= known
-    assert {name for file in files for name in (*file.needs, *file.takes)} <= {each.name for each in question.options}
+    if question.shows is not None:
+        known |= set(signature(question.shows).parameters)
+    options = {option.name for option in app.commands[question.name].options}
+    assert options <= known
+    assert {name for file in files for name in (*file.needs, *file.takes)} <= options
 
 
 @pytest.mark.some(1, 3)

@@ -26,13 +26,12 @@ from ..results import Result, Value
 from ..tolerances import RANK_CUTOFF, SAME_PRICE, SAME_RELATION
 from .freedoms import Freedom
 from .observed import (
-    CameraOption,
+    CameraLike,
+    LegsLike,
     ObservedRobot,
-    ObserveOption,
     RobotLike,
-    SeedOption,
+    Seed,
     SeeLike,
-    SeeOption,
     as_robot,
     as_texts,
     restrict_samples,
@@ -242,10 +241,10 @@ class Advice(Result, shown_as="advise"):
 )
 def advise(
     robot: RobotLike,
-    observe: ObserveOption = None,
-    camera: CameraOption = None,
+    observe: LegsLike = None,
+    camera: CameraLike = None,
     *,
-    see: SeeOption = None,
+    see: SeeLike = None,
     offer: Annotated[
         SeeLike,
         option(
@@ -265,7 +264,7 @@ def advise(
         ),
     ] = "",
     most: int | None = None,
-    seed: SeedOption = 0,
+    seed: Seed = 0,
 ) -> Advice:
     """What is missing: the smallest sets of further measurements that make a robot controllable.
 

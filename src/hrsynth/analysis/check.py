@@ -23,14 +23,14 @@ from .observed import (
     POINTS,
     POSES,
     UNLIMITED,
-    CameraOption,
+    CameraLike,
+    LegsLike,
     Mobility,
     MobilityWritten,
     ObservedRobot,
-    ObserveOption,
     RobotLike,
-    SeedOption,
-    SeeOption,
+    Seed,
+    SeeLike,
     WatchedAxis,
 )
 from .posture import ConfigurationAnalysis, Posture
@@ -140,10 +140,10 @@ class Check(Result, shown_as="check"):
 )
 def check(
     robot: RobotLike,
-    observe: ObserveOption = None,
-    camera: CameraOption = None,
+    observe: LegsLike = None,
+    camera: CameraLike = None,
     *,
-    see: SeeOption = None,
+    see: SeeLike = None,
     at: Annotated[
         PoseLike | Iterable[PoseLike],
         option(f"A pose, such as x=0.02,y=0.1,z=-0.7,phi=10deg; {POSES}", "POSE", kind=list[str]),
@@ -152,7 +152,7 @@ def check(
         Grid | str | None,
         option("A line, plane or box of poses, such as x=-0.3:0.3:21,y=-0.3:0.3:21,z=-0.7 (from:to:count).", "GRID"),
     ] = None,
-    seed: SeedOption = 0,
+    seed: Seed = 0,
 ) -> Check:
     """Mobility, ranks, singularities and redundant constraints at poses, and over a grid of poses.
 

@@ -17,15 +17,15 @@ from ..results import Result
 from .asked import observe as observed
 from .exact import ExactVerdict, architecture
 from .observed import (
-    BeginOption,
-    CameraOption,
+    BeginPose,
+    CameraLike,
+    LegsLike,
     ObservedRobot,
-    ObserveOption,
     OperationModeRecord,
     OtherMode,
     RobotLike,
-    SeedOption,
-    SeeOption,
+    Seed,
+    SeeLike,
     WatchedAxis,
     restrict_samples,
 )
@@ -132,12 +132,12 @@ def _smallest(labels: tuple[str, ...], rank: Callable[[tuple[str, ...]], int]) -
 )
 def legs(
     robot: RobotLike,
-    camera: CameraOption = None,
+    camera: CameraLike = None,
     *,
-    observe: ObserveOption = None,
-    see: SeeOption = None,
-    at: BeginOption = None,
-    seed: SeedOption = 0,
+    observe: LegsLike = None,
+    see: SeeLike = None,
+    at: BeginPose = None,
+    seed: Seed = 0,
 ) -> Legs:
     """Sets of observed legs: their verdicts, the freedoms they lose, and the smallest sets that see the most.
 

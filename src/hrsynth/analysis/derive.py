@@ -33,17 +33,17 @@ from .exact import architecture as exact_architecture
 from .freedoms import Freedom, name_freedoms
 from .observed import (
     POINTS,
-    BeginOption,
-    CameraOption,
+    BeginPose,
+    CameraLike,
+    LegsLike,
     Mobility,
     MobilityWritten,
     ObservedRobot,
-    ObserveOption,
     OperationModeRecord,
     OtherMode,
     RobotLike,
-    SeedOption,
-    SeeOption,
+    Seed,
+    SeeLike,
 )
 from .question import analysis
 from .verdict import Verdict, verdict_of
@@ -166,17 +166,17 @@ class Derivation(Result, shown_as="derive"):
 )
 def derive(
     robot: RobotLike,
-    observe: ObserveOption = None,
-    camera: CameraOption = None,
+    observe: LegsLike = None,
+    camera: CameraLike = None,
     *,
-    see: SeeOption = None,
-    at: BeginOption = None,
+    see: SeeLike = None,
+    at: BeginPose = None,
     form: Annotated[
         str,
         option("simplified (by all rules) or general (sliders, all legs kept).", words=("simplified", "general")),
     ] = "simplified",
     unchecked: bool = True,
-    seed: SeedOption = 0,
+    seed: Seed = 0,
 ) -> Derivation:
     """The hidden robot of a robot, how it is derived, its certificate, and what the controller can see.
 

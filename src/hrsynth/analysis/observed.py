@@ -45,7 +45,14 @@ SAMPLES = 20
 
 UNLIMITED = "joints whose limits are not looked at, as they are parts of other joints"
 """What records say of ``unlimited``."""
-LegsLike = str | int | Iterable[str | int] | None
+LegsLike = Annotated[
+    str | int | Iterable[str | int] | None,
+    option(
+        "Legs to watch (1,4), links, or all (default: what the file observes, else all; none with --see).",
+        "LEGS",
+        group=WATCHING,
+    ),
+]
 """Legs by their labels, or links, as a user gives them: one, several, a text with commas, ``all``; None: all."""
 
 
@@ -340,20 +347,8 @@ class ObservedRobot(Value):
         ]
 
 
-CameraLike = str | Iterable[str] | None
-"""The link that carries the camera, or ``NAME=LINK@x,y,z/r,p,y``, or several of them."""
-SeeLike = str | Iterable[str] | None
-"""``[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius``, or several of them."""
-ObserveOption = Annotated[
-    LegsLike,
-    option(
-        "Legs to watch (1,4), links, or all (default: what the file observes, else all; none with --see).",
-        "LEGS",
-        group=WATCHING,
-    ),
-]
-CameraOption = Annotated[
-    CameraLike,
+CameraLike = Annotated[
+    str | Iterable[str] | None,
     option(
         "The link that carries the camera; or a further camera with a name and its place on a link "
         "(metres; radians or deg; focal length, width and height in pixels); repeat for more.",
@@ -362,8 +357,9 @@ CameraOption = Annotated[
         group=WATCHING,
     ),
 ]
-SeeOption = Annotated[
-    SeeLike,
+"""The link that carries the camera, or ``NAME=LINK@x,y,z/r,p,y``, or several of them."""
+SeeLike = Annotated[
+    str | Iterable[str] | None,
     option(
         "What else is observed: circle, depth, direction, distance, edge, edges, encoder, image_circle, "
         "image_line, inclination, line, point or position, with a point, an axis and a radius where the kind "
@@ -373,14 +369,15 @@ SeeOption = Annotated[
         group=WATCHING,
     ),
 ]
-SeedOption = Annotated[int, option("Seed of the random configurations.", "NUMBER", low=0)]
-BeginOption = Annotated[
+"""``[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius``, or several of them."""
+Seed = Annotated[int, option("Seed of the random configurations.", "NUMBER", low=0)]
+BeginPose = Annotated[
     PoseLike | None,
     option(
         "Pose to start from instead of the zero configuration, perhaps in another operation mode; or mode:2.", "POSE"
     ),
 ]
-StartOption = Annotated[
+StartPose = Annotated[
     PoseLike,
     option(
         "Start pose, such as x=0.02,y=0.1,z=-0.7; mode:2 is a mode with the directions at the goal.",
@@ -388,7 +385,7 @@ StartOption = Annotated[
         old=("--from",),
     ),
 ]
-NoiseOption = Annotated[
+NoiseLike = Annotated[
     str | Noise | None,
     option(
         "Largest errors of what else is observed, such as 0.3px (in images), 0.1deg or 1mm; separate several by "
@@ -396,7 +393,7 @@ NoiseOption = Annotated[
         "AMOUNT",
     ),
 ]
-JobsOption = Annotated[int | None, option("Processes (default: one per core).", low=1)]
+Jobs = Annotated[int | None, option("Processes (default: one per core).", low=1)]
 """What many questions are asked with."""
 POSES = "or mode:2 of the list that modes gives; repeat for more (default: the zero configuration)."
 POINTS = (

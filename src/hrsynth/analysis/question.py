@@ -17,7 +17,7 @@ import numpy as np
 from ..budgets import REMEMBERED_ANSWERS, REMEMBERED_GRIDS
 from ..errors import BadRequest, MissingExtra
 from ..mechanism import Mechanism
-from ..options import Option, kinds_of, options_of, require_range
+from ..options import Option, kinds_of, options_of, plain_signature, require_range
 from ..results import content, require_keywords
 from .observed import as_robot, forget_robots, legs_asked
 
@@ -164,7 +164,7 @@ def analysis(
             large = any(given.get(name) is not None for name in ("plane", "grid"))
             return (_GRIDS if large else _ANSWERS).answer(key, lambda: function(*bound.args, **bound.kwargs))
 
-        asked.__signature__ = known  # type: ignore[attr-defined]
+        asked.__signature__ = plain_signature(function)  # type: ignore[attr-defined]
         asked.declaration = Declaration(place, summary, options, examples, seeded)  # type: ignore[attr-defined]
         return asked
 

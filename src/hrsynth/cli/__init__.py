@@ -11,23 +11,11 @@ import warnings
 
 from ..errors import GuessedPlatform
 from . import completion, files, importing, lint, schema, studio
+from .app import app as app
 from .catalog import catalog
 from .colour import close, say
-from .commands import Group
 from .questions import QUESTIONS
 
-
-def _version() -> str:
-    from ..version import __version__
-
-    return __version__
-
-
-app = Group(
-    "hrsynth",
-    "Hidden robots of parallel robots that are controlled by watching the directions of their legs.",
-    _version,
-)
 for question in QUESTIONS:
     question.add(app)
 lint.add(app)

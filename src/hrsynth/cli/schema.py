@@ -14,6 +14,7 @@ from .. import records
 from ..options import NEEDED, Option
 from ..present.outputs import OUTPUTS, File, function
 from ..records import Head, OfRobot, object_schema
+from .app import app
 from .colour import say
 from .commands import DeclaredCommand, Group, add_command
 
@@ -47,8 +48,6 @@ def schema(command: str) -> dict[str, Any]:
 
 def commands() -> dict[str, DeclaredCommand]:
     """The commands that print JSON, by what follows ``hrsynth``."""
-    from . import app
-
     every: list[Any] = [*app.commands.values()]
     leaves = [each for group in every for each in getattr(group, "commands", {"": group}).values()]
     return {each.name: each for each in leaves if any(option.name == "json" for option in each.options)}

@@ -8,17 +8,8 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
 from ..analysis.branch.answer import BACK, BranchLimit, BranchProof
-from ..analysis.branch.proof import BoxLike, BoxOption, CellsOption, branch, parsed_box
-from ..analysis.observed import (
-    CameraLike,
-    CameraOption,
-    LegsLike,
-    ObservedRobot,
-    ObserveOption,
-    RobotLike,
-    as_robot,
-    as_texts,
-)
+from ..analysis.branch.proof import BoxLike, Cells, MotorBox, branch, parsed_box
+from ..analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, as_robot, as_texts
 from ..analysis.question import analysis
 from ..budgets import BRANCH_CELLS
 from ..errors import BadRequest, HrsynthError
@@ -123,11 +114,11 @@ def export(
     lang: Annotated[
         str, option("c++ (one header, C++17, Eigen) or numpy (one module).", words=("c++", "numpy"))
     ] = "c++",
-    box: BoxOption = None,
+    box: MotorBox = None,
     *,
-    observe: ObserveOption = None,
-    camera: CameraOption = None,
-    effort: CellsOption = BRANCH_CELLS,
+    observe: LegsLike = None,
+    camera: CameraLike = None,
+    effort: Cells = BRANCH_CELLS,
 ) -> ExportedCode:
     """Code for a controller: motors to passive joints and platform, Jacobians, and back, on the branch of the zero
     configuration.

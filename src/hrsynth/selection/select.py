@@ -21,14 +21,14 @@ from ..analysis.aspects.words import SEPARATED
 from ..analysis.modes.modes import AssemblyModes, modes
 from ..analysis.observed import (
     UNLIMITED,
-    CameraOption,
-    NoiseOption,
+    CameraLike,
+    LegsLike,
+    NoiseLike,
     ObservedRobot,
-    ObserveOption,
     RobotLike,
-    SeedOption,
-    SeeOption,
-    StartOption,
+    Seed,
+    SeeLike,
+    StartPose,
 )
 from ..analysis.posture import ConfigurationAnalysis, Posture
 from ..analysis.question import analysis
@@ -273,11 +273,11 @@ class Selection(Result, shown_as="select"):
 @by_name(Criteria, "criteria")
 def select(
     robot: RobotLike,
-    camera: CameraOption = None,
+    camera: CameraLike = None,
     *,
-    observe: ObserveOption = None,
-    see: SeeOption = None,
-    start: StartOption,
+    observe: LegsLike = None,
+    see: SeeLike = None,
+    start: StartPose,
     goal: Annotated[PoseLike, option("Goal pose.", "POSE", old=("--to",))],
     cone: Annotated[
         Cones | None,
@@ -286,9 +286,9 @@ def select(
             "ANGLE",
         ),
     ] = None,
-    noise: NoiseOption = None,
+    noise: NoiseLike = None,
     criteria: Criteria,
-    seed: SeedOption = 0,
+    seed: Seed = 0,
 ) -> Selection:
     """Which legs to watch for a motion from start to goal: all sets, ranked by where else the loop may end and by
     accuracy, and why the others are discarded.

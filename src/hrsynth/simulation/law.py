@@ -43,7 +43,7 @@ POSES = 24
 """Poses between start and goal at which the values of a trajectory are taken."""
 SUPPOSED = "exact, desired or constant:METRES"
 
-DepthOption = Annotated[
+Depth = Annotated[
     str,
     option(
         "Depths in images that the control law uses: exact, desired (those at the goal) or constant:METRES.", "DEPTH"

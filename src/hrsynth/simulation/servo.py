@@ -12,16 +12,7 @@ import numpy as np
 from ..analysis.accuracy.accuracy import sees_all
 from ..analysis.accuracy.cones import IN_SIGHT
 from ..analysis.asked import configurations_at
-from ..analysis.observed import (
-    POINTS,
-    CameraOption,
-    ObservedRobot,
-    ObserveOption,
-    RobotLike,
-    SeedOption,
-    SeeOption,
-    StartOption,
-)
+from ..analysis.observed import POINTS, CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SeeLike, StartPose
 from ..analysis.posture import REGULAR, UNDECIDED, ConfigurationAnalysis
 from ..analysis.question import analysis
 from ..budgets import LONGEST_RUN, RUN_EVALUATIONS
@@ -42,7 +33,7 @@ from ..tolerances import RANK_GAP, SEEN_ABOVE
 from .bench import Bench
 from .camera import Camera, Edges, cylinders, place_camera
 from .ending import EndingClassifier
-from .law import DepthOption, FixedDirections, Law, Sense, Trajectory, measure_all, straight, supposed_planes
+from .law import Depth, FixedDirections, Law, Sense, Trajectory, measure_all, straight, supposed_planes
 from .noise import Sensors, Shocks
 from .pictures import LegRenderer, Pictures, drawing, vision
 from .result import Scatter, Servo
@@ -98,7 +89,7 @@ class Conditions:
     well)."""
     physics: Annotated[bool, option("Drive a simulated mock-up with rods, masses and velocity servos.")] = False
     """Whether a mock-up in MuJoCo is driven, with dynamics."""
-    depth: DepthOption = "exact"
+    depth: Depth = "exact"
     """The depth of what is seen in images, as the law assumes it: ``exact``, ``desired`` (that at the goal) or
     ``constant:0.5`` (m)."""
     duration: Annotated[
@@ -164,14 +155,14 @@ class Conditions:
 @by_name(Conditions, "conditions")
 def servo(
     robot: RobotLike,
-    observe: ObserveOption = None,
-    camera: CameraOption = None,
+    observe: LegsLike = None,
+    camera: CameraLike = None,
     *,
-    see: SeeOption = None,
-    start: StartOption,
+    see: SeeLike = None,
+    start: StartPose,
     goal: Annotated[PoseLike, option("Pose whose measurements are desired.", "POSE", old=("--to",))],
     conditions: Conditions,
-    seed: SeedOption = 0,
+    seed: Seed = 0,
 ) -> Servo:
     """A simulated servo run on what is observed: where it ends, and what it passes on the way.
 

@@ -18,17 +18,7 @@ from ...records import DEG, FLAT, As, Shown, recorded
 from ...results import Result
 from ...tolerances import LARGEST_FIRST_ORDER
 from ..asked import configurations_at
-from ..observed import (
-    POSES,
-    UNLIMITED,
-    CameraOption,
-    NoiseOption,
-    ObservedRobot,
-    ObserveOption,
-    RobotLike,
-    SeedOption,
-    SeeOption,
-)
+from ..observed import POSES, UNLIMITED, CameraLike, LegsLike, NoiseLike, ObservedRobot, RobotLike, Seed, SeeLike
 from ..question import analysis
 from ..verdict import verdict_of
 from .cones import IN_SIGHT, Blur, Cones, unseen
@@ -125,10 +115,10 @@ class Accuracy(Result, shown_as="accuracy"):
 )
 def accuracy(
     robot: RobotLike,
-    observe: ObserveOption = None,
-    camera: CameraOption = None,
+    observe: LegsLike = None,
+    camera: CameraLike = None,
     *,
-    see: SeeOption = None,
+    see: SeeLike = None,
     cone: Annotated[
         Cones | None,
         option(
@@ -136,7 +126,7 @@ def accuracy(
             "ANGLE",
         ),
     ] = None,
-    noise: NoiseOption = None,
+    noise: NoiseLike = None,
     at: Annotated[
         PoseLike | Iterable[PoseLike],
         option(f"A pose, such as x=0.02,y=0.1,z=-0.7; {POSES}", "POSE", kind=list[str]),
@@ -159,7 +149,7 @@ def accuracy(
         ),
     ] = 0,
     into: str | Path | None = None,
-    seed: SeedOption = 0,
+    seed: Seed = 0,
 ) -> Accuracy:
     """How far the platform can be off if what is observed is off by given amounts.
 

@@ -23,7 +23,7 @@ from ...records import FLAT, As, Shown, recorded
 from ...results import Result, Value
 from ...tolerances import FOLLOWED
 from ..modes.modes import AssemblyModes, at_mode, modes
-from ..observed import CameraOption, ObserveOption, RobotLike, SeedOption, SeeOption
+from ..observed import CameraLike, LegsLike, RobotLike, Seed, SeeLike
 from ..question import analysis
 from .held_leg import HeldLegSection, section
 from .path import BUDGET, Aspects, PathAnswer
@@ -159,17 +159,17 @@ class Atlas(Result, shown_as="atlas"):
 )
 def atlas(
     robot: RobotLike,
-    observe: ObserveOption = None,
-    camera: CameraOption = None,
+    observe: LegsLike = None,
+    camera: CameraLike = None,
     *,
-    see: SeeOption = None,
+    see: SeeLike = None,
     at: Annotated[
         PoseLike | ClosedConfiguration | None,
         option(
             "Pose whose directions are held, such as x=0.02,y=0.1,z=-0.7 (default: the zero configuration).", "POSE"
         ),
     ] = None,
-    seed: SeedOption = 0,
+    seed: Seed = 0,
     budget: int = BUDGET,
 ) -> Atlas:
     """Which modes with the same directions can be reached from each other without a Type 2 singularity, mode by mode.

@@ -26,18 +26,7 @@ from ...tolerances import AS_PRINTED, RANK_CUTOFF, RANK_GAP, SOLVED
 from ..accuracy.cones import unseen
 from ..asked import configurations_at
 from ..measured import MeasuredRobot
-from ..observed import (
-    CameraLike,
-    CameraOption,
-    LegsLike,
-    ObservedRobot,
-    ObserveOption,
-    RobotLike,
-    SeedOption,
-    SeeLike,
-    SeeOption,
-    StartOption,
-)
+from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SeeLike, StartPose
 from ..question import analysis
 from ..singularity.agreement import smallest_of, weakest
 from .condition_enclosure import ConditionEnclosure, PathSegment, enclose_value, is_beyond, sign_of
@@ -486,15 +475,15 @@ class Aspects(Value):
 )
 def path(
     robot: RobotLike,
-    observe: ObserveOption = None,
-    camera: CameraOption = None,
+    observe: LegsLike = None,
+    camera: CameraLike = None,
     *,
-    see: SeeOption = None,
-    start: StartOption,
+    see: SeeLike = None,
+    start: StartPose,
     goal: Annotated[
         PoseLike, option("Goal pose; mode:2 is a mode with the directions at the start.", "POSE", old=("--to",))
     ],
-    seed: SeedOption = 0,
+    seed: Seed = 0,
     budget: int = BUDGET,
 ) -> PathAnswer:
     """Whether a path without Type 2 singularity joins two poses, with a proof: same aspect, separated, undecided.

@@ -32,7 +32,7 @@ BOUNDED = "bounded over the tubes"
 BoxLike = Mapping[str, Sequence[float]] | str
 
 
-BoxOption = Annotated[
+MotorBox = Annotated[
     BoxLike | None,
     option(
         "Intervals of motors (m, rad), such as hip=-1:1,slide=0:0.2 (default: the file's limits, else a "
@@ -40,7 +40,7 @@ BoxOption = Annotated[
         "INTERVALS",
     ),
 ]
-CellsOption = Annotated[int, option("Most cells to try for each part of the loops.", "COUNT", low=1)]
+Cells = Annotated[int, option("Most cells to try for each part of the loops.", "COUNT", low=1)]
 
 
 @analysis(
@@ -48,7 +48,7 @@ CellsOption = Annotated[int, option("Most cells to try for each part of the loop
     examples=("rrrrr_m1 --box shoulder_1=-0.2:0.2,shoulder_2=-0.2:0.2",),
     seeded=False,
 )
-def branch(robot: RobotLike, box: BoxOption = None, *, effort: CellsOption = BRANCH_CELLS) -> BranchProof:
+def branch(robot: RobotLike, box: MotorBox = None, *, effort: Cells = BRANCH_CELLS) -> BranchProof:
     """Where the joints are proved to be one function of the motors, on the branch of the zero configuration, and where
     that ends.
 

@@ -27,16 +27,7 @@ from ...results import Result
 from ...tolerances import MEASUREMENT_BOUND, SAME_NEAR_POSE
 from ..formation import Formation
 from ..measured import MeasuredRobot
-from ..observed import (
-    POINTS,
-    UNLIMITED,
-    CameraOption,
-    ObservedRobot,
-    ObserveOption,
-    RobotLike,
-    SeedOption,
-    SeeOption,
-)
+from ..observed import POINTS, UNLIMITED, CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SeeLike
 from ..question import analysis
 from .assembly_mode import AssemblyMode, ModeReader, found_mode
 from .branches import Model
@@ -240,10 +231,10 @@ class AssemblyModes(Result, shown_as="modes"):
 )
 def modes(
     robot: RobotLike,
-    observe: ObserveOption = None,
-    camera: CameraOption = None,
+    observe: LegsLike = None,
+    camera: CameraLike = None,
     *,
-    see: SeeOption = None,
+    see: SeeLike = None,
     at: Annotated[
         PoseLike | ClosedConfiguration | None,
         option(
@@ -266,7 +257,7 @@ def modes(
             low=0,
         ),
     ] = EFFORT,
-    seed: SeedOption = 0,
+    seed: Seed = 0,
 ) -> AssemblyModes:
     """Assembly modes: poses of the platform with the same measurements, and whether they are proved to be all.
 

@@ -22,15 +22,7 @@ from ...results import Result, Value
 from ...tolerances import SOLVED
 from ..freedoms import Freedom, name_freedoms
 from ..measured import MeasuredRobot
-from ..observed import (
-    POINTS,
-    CameraOption,
-    ObservedRobot,
-    ObserveOption,
-    RobotLike,
-    SeedOption,
-    SeeOption,
-)
+from ..observed import POINTS, CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SeeLike
 from ..question import analysis
 from ..verdict import Verdict
 from .agreement import Agreement, agreement, weakest
@@ -144,15 +136,15 @@ class Singularity(Result, shown_as="singular"):
 )
 def singular(
     robot: RobotLike,
-    observe: ObserveOption = None,
-    camera: CameraOption = None,
+    observe: LegsLike = None,
+    camera: CameraLike = None,
     *,
-    see: SeeOption = None,
+    see: SeeLike = None,
     real: Annotated[bool, option("Ask about the real robot with its own motors instead of the hidden one.")] = False,
     points: Annotated[
         int, option("Number of random poses at which the condition is checked.", low=1, high=10_000_000)
     ] = RANDOM_POSES,
-    seed: SeedOption = 0,
+    seed: Seed = 0,
 ) -> Singularity:
     """Where a freedom of the platform is lost: the Type 2 condition in words, as an expression and drawn.
 

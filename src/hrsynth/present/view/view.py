@@ -10,15 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ...analysis.derive import Derivation, derive
-from ...analysis.observed import (
-    POINTS,
-    CameraOption,
-    ObservedRobot,
-    ObserveOption,
-    RobotLike,
-    SeedOption,
-    SeeOption,
-)
+from ...analysis.observed import POINTS, CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SeeLike
 from ...analysis.question import analysis
 from ...geometry.vectors import Array, orient_axis
 from ...kinematics.coordinates import Coordinates
@@ -159,12 +151,12 @@ class View(Result, shown_as="view"):
 )
 def view(
     robot: RobotLike,
-    observe: ObserveOption = None,
-    camera: CameraOption = None,
+    observe: LegsLike = None,
+    camera: CameraLike = None,
     *,
-    see: SeeOption = None,
+    see: SeeLike = None,
     hidden: Annotated[bool, option("Show the hidden robot too, its virtual actuators highlighted.")] = False,
-    seed: SeedOption = 0,
+    seed: Seed = 0,
 ) -> View:
     """A 3D view in the browser: sliders that keep the loops closed, what is observed, assembly modes.
 

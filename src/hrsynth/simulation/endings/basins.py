@@ -16,15 +16,7 @@ import numpy as np
 from ...analysis.accuracy.cones import Blur
 from ...analysis.accuracy.error_map import Mapper
 from ...analysis.asked import configurations_at
-from ...analysis.observed import (
-    CameraOption,
-    JobsOption,
-    ObservedRobot,
-    ObserveOption,
-    RobotLike,
-    SeedOption,
-    SeeOption,
-)
+from ...analysis.observed import CameraLike, Jobs, LegsLike, ObservedRobot, RobotLike, Seed, SeeLike
 from ...analysis.question import analysis
 from ...batch.grids import poses_over
 from ...batch.reach import sweep
@@ -53,7 +45,7 @@ from ...records import FLAT, As, Number, Shown, Table, recorded
 from ...results import Result, Value
 from ...tolerances import RUNS_ALIKE, SEEN_ABOVE
 from ..ending import ENDINGS, GOAL, SIGHT, TIME, UNDECIDED, Ending, EndingClassifier
-from ..law import DepthOption, measure_all
+from ..law import Depth, measure_all
 from ..run import AWAY, EFFORT, LOST, POISED, REST, SERVED_AT
 from ..run import TIME as OVER
 from ..servo import Conditions, ServoTask
@@ -203,10 +195,10 @@ class Basins(Result, shown_as="basins"):
 )
 def basins(
     robot: RobotLike,
-    observe: ObserveOption = None,
-    camera: CameraOption = None,
+    observe: LegsLike = None,
+    camera: CameraLike = None,
     *,
-    see: SeeOption = None,
+    see: SeeLike = None,
     to: Annotated[PoseLike, option("Pose whose measurements are desired.", "POSE")],
     plane: Annotated[
         PoseLike | None,
@@ -224,9 +216,9 @@ def basins(
             "Starts along each side of the plane (default: 100; 15 if each is simulated separately).", low=2, high=300
         ),
     ] = None,
-    jobs: JobsOption = None,
-    depth: DepthOption = "exact",
-    seed: SeedOption = 0,
+    jobs: Jobs = None,
+    depth: Depth = "exact",
+    seed: Seed = 0,
 ) -> Basins:
     """Where the servo loop to a goal ends, from each start of a line, plane or box of poses.
 

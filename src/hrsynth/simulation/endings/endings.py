@@ -20,15 +20,7 @@ from ...analysis.aspects.vector_expressions import NoLegForm
 from ...analysis.branch.carried_vectors import SweptChains
 from ...analysis.measured import MeasuredRobot
 from ...analysis.modes.modes import AssemblyModes, modes
-from ...analysis.observed import (
-    CameraOption,
-    JobsOption,
-    ObservedRobot,
-    ObserveOption,
-    RobotLike,
-    SeedOption,
-    SeeOption,
-)
+from ...analysis.observed import CameraLike, Jobs, LegsLike, ObservedRobot, RobotLike, Seed, SeeLike
 from ...analysis.posture import ConfigurationAnalysis
 from ...analysis.question import analysis
 from ...budgets import COVER_BOXES
@@ -46,7 +38,7 @@ from ...options import option
 from ...progress import tell
 from ...tolerances import CRITICAL_FLAT, DAMPED, SAME_ENDING, SEEN_ABOVE, VANISHED
 from ..ending import ANTIPODAL, BOUNDARY, GOAL, MODE, rest
-from ..law import DepthOption, FixedDirections, Law, Measures, measure_all, supposed_planes
+from ..law import Depth, FixedDirections, Law, Measures, measure_all, supposed_planes
 from ..servo import require_regular, require_seen, require_sight
 from .completeness import Covers
 from .critical_poses import Further, Lift, critical_poses
@@ -73,10 +65,10 @@ NEARBY = 0.02
 )
 def endings(
     robot: RobotLike,
-    observe: ObserveOption = None,
-    camera: CameraOption = None,
+    observe: LegsLike = None,
+    camera: CameraLike = None,
     *,
-    see: SeeOption = None,
+    see: SeeLike = None,
     at: Annotated[
         PoseLike | None,
         option(
@@ -85,13 +77,13 @@ def endings(
             "POSE",
         ),
     ] = None,
-    depth: DepthOption = "exact",
+    depth: Depth = "exact",
     complete: Annotated[bool, option("Try to prove that the list is complete, by boxes of platform poses.")] = False,
     effort: Annotated[
         int, option("Most boxes of poses to look at (10,000 to 40,000 take a second).", "COUNT", low=1)
     ] = COVER_BOXES,
-    jobs: JobsOption = None,
-    seed: SeedOption = 0,
+    jobs: Jobs = None,
+    seed: Seed = 0,
 ) -> Endings:
     """Poses at which the servo loop can rest, and which of them attract: the goal, modes, antipodal poses,
     critical poses of the error.

@@ -1,0 +1,16 @@
+"""The command line's commands; each module of this folder adds its own."""
+
+from .commands import Group
+
+
+def _version() -> str:
+    from ..version import __version__
+
+    return __version__
+
+
+app = Group(
+    "hrsynth",
+    "Hidden robots of parallel robots that are controlled by watching the directions of their legs.",
+    _version,
+)
