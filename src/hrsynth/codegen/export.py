@@ -76,23 +76,26 @@ class ExportedCode(Result, shown_as="export"):
     motors = Shown(list[str], lambda self: self.proof.motors)
     passive = Shown(list[str], lambda self: self.proof.passive)
     held = Shown(list[str], lambda self: self.proof.held)
-    inverse = Shown(
-        Literal["closed form", "Newton's method"],
-        lambda self: "closed form" if self.closed else "Newton's method",
-        "how the program finds the motors of a pose",
-    )
-    steps = Shown(
-        int | None,
-        lambda self: self.bounds and self.bounds.steps,
-        "steps of Newton's method that are enough in each part (proved), or null",
-    )
-    error = Shown(
-        float | None,
-        lambda self: self.bounds and self.bounds.error,
-        "how far an answer is off at most (rad, 1, characteristic lengths; proved), or null",
-    )
     back = Shown(Table | None, lambda self: self.proof.back, BACK)
     limits = Shown(list[BranchLimit], lambda self: self.proof.limits)
+
+    @property
+    @recorded()
+    def inverse(self) -> Literal["closed form", "Newton's method"]:
+        """How the program finds the motors of a pose."""
+        return "closed form" if self.closed else "Newton's method"
+
+    @property
+    @recorded()
+    def steps(self) -> int | None:
+        """Steps of Newton's method that are enough in each part (proved), or null."""
+        return self.bounds.steps if self.bounds else None
+
+    @property
+    @recorded()
+    def error(self) -> float | None:
+        """How far an answer is off at most (rad, 1, characteristic lengths; proved), or null."""
+        return self.bounds.error if self.bounds else None
 
     @property
     @recorded()
