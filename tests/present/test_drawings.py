@@ -73,7 +73,7 @@ def assert_coloured(root: Any, mechanism: Mechanism, virtual: set[str]) -> None:
     assert set(joints_in(root, "virtual")) == virtual
     assert not driven(mechanism) & set(others)
     for group in root.xpath(".//g[@class='motor']"):
-        assert svg.MOTOR in [element.get("fill") for element in group.iter()]
+        assert svg.FILLS["motor"] in [element.get("fill") for element in group.iter()]
 
 
 def runs(found: Layout) -> Iterator[tuple[int, float, float]]:
@@ -103,7 +103,7 @@ def assert_free(found: Layout) -> None:
 @pytest.mark.some(33)
 @DRAWINGS
 @pytest.mark.parametrize("name", shipped())
-def test_every_joint_of_a_robot_stands_once_and_motors_are_grey(name: str, draw: Draw) -> None:
+def test_every_joint_of_a_robot_stands_once_and_motors_are_marked(name: str, draw: Draw) -> None:
     mechanism, observed = real(name)
     assert_whole(draw(mechanism, observed=observed), mechanism, observed, set())
     assert_free(plan(mechanism, observed=observed))

@@ -15,10 +15,9 @@ from ..simulation.ending import ANTIPODAL, BOUNDARY, GOAL, MINIMUM, MODE, SIGHT,
 from ..simulation.endings.basins import LETTERS, NOT_REACHED, BasinEnd, Basins, place_of
 from ..simulation.endings.flow import Flags, Places
 from ..tolerances import IN_PLANE
-from . import plots
+from . import palette, plots
 from .paper import PNG, Paper, print_figure
 from .plots import (
-    COLOURS,
     MapPlane,
     cell_edges,
     entry,
@@ -33,12 +32,16 @@ from .runs import ENDS
 from .sketch import axis_label
 
 SHADES = {
-    GOAL: (COLOURS[2], "#7FCEB9"),
-    MODE: (COLOURS[0], COLOURS[5], "#B9DDF3"),
-    ANTIPODAL: (COLOURS[3], "#E8C4D8"),
-    MINIMUM: (COLOURS[4], "#F5D48A"),
-    BOUNDARY: (COLOURS[1], "#EFB48D"),
-    SIGHT: ("#6B4A2B",),
+    GOAL: (palette.colour("goal"), palette.tint(palette.colour("goal"))),
+    MODE: (
+        palette.colour("mode"),
+        palette.tint(palette.colour("mode"), 0.6),
+        palette.tint(palette.colour("mode"), 0.3),
+    ),
+    ANTIPODAL: (palette.SERIES[3], palette.tint(palette.SERIES[3])),
+    MINIMUM: (palette.SERIES[4], palette.tint(palette.SERIES[4])),
+    BOUNDARY: (palette.SERIES[1], palette.tint(palette.SERIES[1])),
+    SIGHT: (palette.SERIES[5],),
     TIME: ("0.3",),
     UNDECIDED: ("0.5",),
 }

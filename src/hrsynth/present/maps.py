@@ -18,7 +18,7 @@ from ..errors import BadRequest
 from ..geometry.vectors import Array
 from ..mechanism.pose import PARTS
 from ..tolerances import DARKEST_DISTANCE, DISTANCE_FLOOR
-from . import plots
+from . import palette, plots
 from .paper import PNG, Paper, print_figure
 from .plots import (
     MapPlane,
@@ -53,7 +53,7 @@ MARKS = {
 }
 """Marks of singular poses by their state."""
 VALUE = "smallest singular value of Mᵀ"
-LOCI = {"hidden robot": ("crimson", "solid", "o"), "real robot": ("royalblue", "dashed", "s")}
+LOCI = {"hidden robot": (palette.colour("actuator"), "solid", "o"), "real robot": (palette.PAGE["ink"], "dashed", "s")}
 NEAR_TYPE_1 = 0.5
 """Fraction of its median to which the distance to Type 1 falls at a boundary of that kind."""
 ERRORS = "cividis"
@@ -88,7 +88,7 @@ def distance_map(found: Check, paper: Paper = PNG) -> bytes:
     entries = [missing_entry()] if UNREACHABLE in grid.states else []
     entries += _robot(figure, grid.grid, found.setting)
     entries += [
-        entry(label, linestyle="", marker=mark, color="red", markeredgecolor="white")
+        entry(label, linestyle="", marker=mark, color=palette.colour("step4"), markeredgecolor="white")
         for state, (mark, label) in MARKS.items()
         if state in grid.states
     ]
@@ -158,7 +158,12 @@ def _distances(place: Any, plane: MapPlane, numbers: Array, states: NDArray[np.s
     for state, (mark, _) in MARKS.items():
         i, j = np.nonzero(states == state)
         place.scatter(
-            *plane.at(plane.x[i], plane.y[j]), marker=mark, s=26, color="red", edgecolor="white", linewidth=0.6
+            *plane.at(plane.x[i], plane.y[j]),
+            marker=mark,
+            s=26,
+            color=palette.colour("step4"),
+            edgecolor="white",
+            linewidth=0.6,
         )
 
 
@@ -178,7 +183,7 @@ def _distance_curve(grid: GridCheck, numbers: Array, states: NDArray[np.str_], p
             np.fmax(numbers[hit], floor),
             marker=mark,
             s=36,
-            color="red",
+            color=palette.colour("step4"),
             edgecolor="white",
             linewidth=0.6,
             zorder=3,
@@ -274,7 +279,7 @@ def _drawn_locus(place: Any, plane: MapPlane, field: SingularityMap, name: str) 
 
 
 def _boundary(place: Any, plane: MapPlane, drawn: Locus) -> list[Any]:
-    """The reached poses next to others that are not, those near a Type 1 singularity orange; what the legend says."""
+    """The reached poses next to others that are not, in a colour near a Type 1 singularity; what the legend says."""
     reached = np.isfinite(drawn.hidden.type2)
     padded = np.pad(reached, 1, mode="edge")
     inside = padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
@@ -287,7 +292,7 @@ def _boundary(place: Any, plane: MapPlane, drawn: Locus) -> list[Any]:
             near |= np.min(around, axis=0) < NEAR_TYPE_1 * np.nanmedian(field.type1)
     entries = []
     for cells, colour, words in (
-        (border & near, "darkorange", "Type 1 boundary"),
+        (border & near, palette.SERIES[1], "Type 1 boundary"),
         (border & ~near, "black", "other limit of reach"),
     ):
         i, j = np.nonzero(cells)

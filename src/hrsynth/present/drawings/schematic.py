@@ -1,8 +1,8 @@
 """A mechanism drawn in the manner of the papers, legs as parallel rows from the base to the platform, in two ways.
 
 The *joint graph* has boxes with the letters of joints, lines are links. The *kinematic scheme* has a symbol for each
-joint (MMT Table 1, Figs. 2, 4, 13), its legs are bent at their knees. In both, motors are grey, virtual actuators
-coloured, observed segments thick coloured lines. Equal rods side by side are drawn parallel.
+joint (MMT Table 1, Figs. 2, 4, 13), its legs are bent at their knees. In both, motors, virtual actuators and
+observed segments (thick lines) have the colours of the palette. Equal rods side by side are drawn parallel.
 
 Every joint stands in exactly one element with ``data-joint`` (a planar parallelogram's four in one, a line each), every
 link in one with ``data-link``.
@@ -191,7 +191,7 @@ def _scheme(drawn: Layout, name: str) -> str:
         [
             *_ends(drawn, bends, 16, 8, hatched=True),
             _links(drawn, bends, stroke_width=2, stroke_linejoin="round"),
-            svg.element("path", d=heads, fill=svg.VIRTUAL) if heads else "",
+            svg.element("path", d=heads, fill=svg.WATCHED) if heads else "",
             svg.element("g", *(_symbol(spot, bends) for spot in drawn.spots), stroke=svg.INK, stroke_width=1.6),
         ],
     )
@@ -240,7 +240,7 @@ def _links(drawn: Layout, scale: Scale, **style: object) -> str:
     plain = [_net(net, scale) for net in drawn.nets if net.link not in drawn.observed]
     seen = [_net(net, scale) for net in drawn.nets if net.link in drawn.observed]
     return svg.element("g", *plain, fill="none", stroke=svg.INK, **style) + svg.element(
-        "g", *seen, fill="none", stroke=svg.VIRTUAL, stroke_width=4, class_="observed"
+        "g", *seen, fill="none", stroke=svg.WATCHED, stroke_width=4, class_="observed"
     )
 
 
@@ -271,8 +271,8 @@ def _head(net: Net, scale: Scale) -> str:
 def _boxes(drawn: Layout, scale: Scale) -> list[str]:
     found = []
     for kind, fill, stroke in (
-        ("joint", "#fff", svg.INK),
-        ("motor", svg.MOTOR, svg.INK),
+        ("joint", svg.EMPTY, svg.INK),
+        ("motor", svg.FILLS["motor"], svg.MOTOR),
         ("virtual", svg.VIRTUAL, svg.VIRTUAL),
     ):
         boxes = [_box(spot, scale) for spot in drawn.spots if spot.box.kind == kind]
@@ -295,7 +295,7 @@ def _box(spot: PlacedBox, scale: Scale) -> str:
             text_anchor="middle",
             font_size=14,
             stroke="none",
-            fill="#fff" if box.virtual else svg.INK,
+            fill=svg.EMPTY if box.virtual else svg.INK,
             text_decoration="underline" if box.driven else None,
         ),
         data_joint="\n".join(box.joints),
@@ -304,14 +304,19 @@ def _box(spot: PlacedBox, scale: Scale) -> str:
 
 def _symbol(spot: PlacedBox, bends: Bends) -> str:
     box, (x, y) = spot.box, bends.at(spot.x, spot.lane)
-    fill = {"virtual": svg.TINT, "motor": svg.MOTOR, "joint": "#fff"}[box.kind]
     role = {"virtual": ", virtual actuator", "motor": ", driven by a motor", "joint": ""}[box.kind]
     angle = 0.0
     if box.letter in STRAIGHT:
         (a, b), (c, d) = (bends.at(spot.x + side, spot.lane) for side in (-0.05, 0.05))
         angle = math.degrees(math.atan2(d - b, c - a))
     drawing = symbol(
-        box.letter, x, y, angle, fill, f"{WORDS[box.letter]} {', '.join(box.joints)}{role}", "\n".join(box.joints)
+        box.letter,
+        x,
+        y,
+        angle,
+        svg.FILLS[box.kind],
+        f"{WORDS[box.letter]} {', '.join(box.joints)}{role}",
+        "\n".join(box.joints),
     )
     letter = svg.words(
         box.letter,
@@ -319,10 +324,10 @@ def _symbol(spot: PlacedBox, bends: Bends) -> str:
         y - 16,
         text_anchor="middle",
         stroke="none",
-        fill=svg.VIRTUAL if box.virtual else svg.INK,
+        fill=svg.STROKES[box.kind],
         text_decoration="underline" if box.driven else None,
     )
-    return svg.element("g", drawing, letter, class_=box.kind, stroke=svg.VIRTUAL if box.virtual else None)
+    return svg.element("g", drawing, letter, class_=box.kind, stroke=svg.STROKES[box.kind])
 
 
 def _ends(drawn: Layout, scale: Scale, over: float, above: float, *, hatched: bool) -> list[str]:
@@ -334,7 +339,7 @@ def _ends(drawn: Layout, scale: Scale, over: float, above: float, *, hatched: bo
             continue
         (x, upper), (_, lower) = (scale.at(net.bar[0], lane) for lane in net.bar[1:])
         upper, lower = upper - over, lower + over
-        colour = svg.VIRTUAL if net.link in drawn.observed else svg.INK
+        colour = svg.WATCHED if net.link in drawn.observed else svg.INK
         found.append(svg.element("path", d=svg.lines([[(x, upper), (x, lower)]]), stroke=colour, stroke_width=5))
         if hatched and net.link == base:
             strokes = [[(x, y), (x - 6, y + 6)] for y in range(int(upper), int(lower), 7)]

@@ -10,9 +10,11 @@ from ...analysis.derive import Derivation
 from ...characters import name_steering
 from ...tolerances import RANK_GAP, SAME_RELATION
 from ...version import __version__
+from ..drawings import svg
 from ..drawings.schematic import graph_svg
 from ..maps import error_map
 from ..modes import picture, why_undrawn
+from ..palette import css
 from ..portrait import Portrait
 from ..text.poses import all_of, at_mode, proof_words
 from ..text.robots import at_zero, exact_words, lost_rows, unseen
@@ -101,6 +103,8 @@ def _template() -> Any:
         collected=collect_symbols,
         exact_words=exact_words,
         lost=lost_rows,
+        palette=css(),
+        svg=svg,
         at_zero=at_zero,
         field_rows=field_rows,
         formula=formula,

@@ -27,7 +27,7 @@ class Picture {
     const own = sights.filter(({ camera, image }) => camera === this.number && image.length);
     const place = ([x, y]) => [width / 2 + scale * x, height / 2 + scale * y];
     pen.clearRect(0, 0, width, height);
-    pen.strokeStyle = "#b6bec9";
+    pen.strokeStyle = "silver";
     pen.lineWidth = 1;
     pen.strokeRect(width / 2 - 8, height / 2, 16, 0);
     pen.strokeRect(width / 2, height / 2 - 8, 0, 16);

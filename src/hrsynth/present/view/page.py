@@ -6,6 +6,7 @@ from html import escape
 from pathlib import Path
 
 from ...characters import name_steering
+from .. import palette
 from .view import View
 
 FOLDER = Path(__file__).parent
@@ -42,8 +43,8 @@ def page(found: View) -> str:
         template.render(
             robot=found.setting.robot.name,
             scene=found.scene(),
-            style=text(FOLDER / "page.css", STAGE / "stage.css"),
+            style=palette.css() + text(FOLDER / "page.css", STAGE / "stage.css"),
             three=text(STAGE / "three.min.js"),
-            script=text(*(STAGE / name for name in SCRIPTS), FOLDER / "page.js"),
+            script=palette.js() + text(*(STAGE / name for name in SCRIPTS), FOLDER / "page.js"),
         )
     )
