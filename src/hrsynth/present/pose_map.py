@@ -15,7 +15,7 @@ from . import plots
 from .paper import Paper
 from .plots import MapPlane, cell_edges, panels, round_ticks, tick_values, tick_words
 
-MOST = 4
+COLUMNS = 4
 """Maps beside each other at most."""
 SIDE, SMALL = 5.4, 3.4
 """Width (inches) of a map of a plane, and of one of a box."""
@@ -45,7 +45,7 @@ class PoseMap:
         name, values = (*grid.axes, ("", np.zeros(1)))[2]
         count = len(values) if name else quantities
         side, least = (SMALL, LEAST_SMALL) if name else (SIDE, LEAST_SIDE)
-        columns = paper.columns(min(count, MOST), least)
+        columns = paper.columns(min(count, COLUMNS), least)
         each = -(-count // columns)
         rows, bars = (quantities * each, 1) if name else (each, columns)
         figure, axes = panels(
