@@ -13,6 +13,7 @@ from hrsynth.catalog.jsonl import line, record
 from hrsynth.catalog.site import index, site
 from hrsynth.catalog.site.structures import address_name, structures
 from hrsynth.catalog.words import parse
+from hrsynth.present.palette import colour, tint
 
 pytestmark = pytest.mark.browser
 READY = "document.readyState == 'complete'"
@@ -63,7 +64,10 @@ def test_a_page_shows_the_motors_of_the_architecture_that_was_chosen(tab: Tab, t
     tab.page.wait_for_function("document.getElementById('word')?.textContent == '3(Rz-Rz*-Rz)'")
     moved = tab.page.locator("#real .motor [data-joint]")
     assert [joint.get_attribute("data-joint") for joint in moved.all()] == [f"joint_{k}_2" for k in (1, 2, 3)]
-    assert moved.first.evaluate("each => getComputedStyle(each).fill") == "rgb(189, 189, 189)"
+    assert (
+        moved.first.evaluate("each => getComputedStyle(each).fill")
+        == f"rgb{tuple(bytes.fromhex(tint(colour('motor'))[1:]))}"
+    )
     assert tab.page.locator("#file a").get_attribute("href") == f"../r/{address_name('3(Rz-Rz*-Rz)')}.urdf"
     tab.page.locator("#variants").get_by_role("link", name="3-RRR").first.click()
     tab.page.wait_for_function("document.getElementById('word').textContent == '3(Rz*-Rz-Rz)'")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from itertools import combinations
 from pathlib import Path
@@ -10,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hrsynth.present.view.page import STAGE
+import hrsynth
+from hrsynth.present.palette import MEANINGS, PAGE, SERIES
 
 APART = 15.0
 """Distance of two colours (CIE 1976 L*a*b*; 2.3 can just be seen) at least, whoever looks."""
@@ -33,12 +33,6 @@ TO_XYZ = np.array(
 """Linear sRGB to XYZ (IEC 61966-2-1), white D65."""
 
 
-def table() -> dict[str, tuple[str, str]]:
-    """The meanings, words and colours of the page."""
-    (found,) = re.findall(r"const COLOURS = (\{.*?\});", (STAGE / "colours.js").read_text(encoding="utf-8"), re.DOTALL)
-    return {meaning: (words, colour) for meaning, (words, colour) in json.loads(found).items()}
-
-
 def linear(colour: str) -> np.ndarray:
     v = np.array([int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)])
     return np.where(v <= 0.04045, v / 12.92, ((v + 0.055) / 1.055) ** 2.4)
@@ -56,7 +50,7 @@ def seen(colour: str, eyes: str) -> np.ndarray:
 
 @pytest.mark.parametrize("eyes", EYES)
 def test_any_two_meanings_differ_to_all_eyes(eyes: str):
-    colours = {meaning: seen(colour, eyes) for meaning, (_, colour) in table().items()}
+    colours = {meaning: seen(colour, eyes) for meaning, (_, colour) in MEANINGS.items()}
     apart = {pair: float(np.linalg.norm(colours[pair[0]] - colours[pair[1]])) for pair in combinations(colours, 2)}
     assert {pair: d for pair, d in apart.items() if d < APART} == {}
 
@@ -71,22 +65,31 @@ def test_the_simulated_eyes_confuse_what_they_should():
 
 
 def test_a_meaning_has_one_colour_and_words_of_its_own():
-    words, colours = zip(*table().values(), strict=True)
+    words, colours = zip(*MEANINGS.values(), strict=True)
     assert len(set(words)) == len(set(colours)) == len(words)
     assert all(re.fullmatch("#[0-9a-f]{6}", colour) for colour in colours)
 
 
-def test_no_other_script_of_the_page_holds_a_colour_of_a_meaning():
-    """Lights are white to grey; all else is asked of the table."""
-    for file in sorted(Path(STAGE).glob("*.js")):
-        if file.name not in ("three.min.js", "colours.js"):
+def test_no_other_file_holds_a_colour():
+    """Lights are white to grey; all else is asked of the palette."""
+    package = Path(hrsynth.__file__).parent
+    for file in (each for folder in ("present", "catalog") for each in sorted((package / folder).rglob("*"))):
+        if file.suffix in (".py", ".js", ".css", ".html", ".j2") and file.name not in ("three.min.js", "palette.py"):
             found = re.findall(r"(?:0x|#)[0-9a-fA-F]{6}\b", file.read_text(encoding="utf-8"))
-            assert all(np.ptp([int(each[-6:][i : i + 2], 16) for i in (0, 2, 4)]) < 20 for each in found), file.name
+            parts = [[int(each[-6:][i : i + 2], 16) for i in (0, 2, 4)] for each in found]
+            assert all(np.ptp(each) < 20 for each in parts), file.name
+
+
+def test_the_style_of_plots_has_the_colours_of_the_palette():
+    text = (Path(hrsynth.__file__).parent / "present" / "style.mplstyle").read_text(encoding="utf-8")
+    used = {f"#{each}" for each in re.findall(r"\b[0-9a-f]{6}\b", text)}
+    assert used <= {*SERIES, *PAGE.values()}
+    assert {*SERIES} <= used
 
 
 def test_names_are_read_on_every_colour():
     """Black or white, as `Colours.ink` chooses: 4.5 to 1 (WCAG 2.2, 1.4.3)."""
-    for meaning, (_, colour) in table().items():
+    for meaning, (_, colour) in MEANINGS.items():
         y = float(TO_XYZ[1] @ linear(colour))
         contrast = (y + 0.05) / 0.05 if y > 0.179 else 1.05 / (y + 0.05)
         assert contrast >= 4.5, meaning

@@ -1,9 +1,9 @@
-"""Joint graphs and schemes: every joint stands there once, in its right colour, and no line runs through a box."""
+"""Schemes: every joint stands there once, in its right colour, and no line runs through a box."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
 
@@ -21,10 +21,8 @@ from hrsynth.mechanism.normal import normal_form
 from hrsynth.mechanism.sensors import default_observation
 from hrsynth.present.drawings import svg
 from hrsynth.present.drawings.plan import Layout, plan
-from hrsynth.present.drawings.schematic import graph_svg, leg_svg, robot_svg
+from hrsynth.present.drawings.schematic import leg_svg, robot_svg
 
-Draw = Callable[..., str]
-DRAWINGS = pytest.mark.parametrize("draw", [graph_svg, robot_svg])
 FEW = ("rrrrr_m1", "quattro", "uranesx")
 
 
@@ -73,7 +71,7 @@ def assert_coloured(root: Any, mechanism: Mechanism, virtual: set[str]) -> None:
     assert set(joints_in(root, "virtual")) == virtual
     assert not driven(mechanism) & set(others)
     for group in root.xpath(".//g[@class='motor']"):
-        assert svg.MOTOR in [element.get("fill") for element in group.iter()]
+        assert svg.FILLS["motor"] in [element.get("fill") for element in group.iter()]
 
 
 def runs(found: Layout) -> Iterator[tuple[int, float, float]]:
@@ -101,11 +99,10 @@ def assert_free(found: Layout) -> None:
 
 
 @pytest.mark.some(33)
-@DRAWINGS
 @pytest.mark.parametrize("name", shipped())
-def test_every_joint_of_a_robot_stands_once_and_motors_are_grey(name: str, draw: Draw) -> None:
+def test_every_joint_of_a_robot_stands_once_and_motors_are_marked(name: str) -> None:
     mechanism, observed = real(name)
-    assert_whole(draw(mechanism, observed=observed), mechanism, observed, set())
+    assert_whole(robot_svg(mechanism, observed=observed), mechanism, observed, set())
     assert_free(plan(mechanism, observed=observed))
 
 
@@ -118,16 +115,14 @@ def test_virtual_actuators_of_hidden_robots_are_coloured(name: str, form: str) -
         assert name.startswith("3ppr")
         return
     observed, virtual = {o.link for o in hidden.observations}, driven(hidden)
-    for draw in (graph_svg, robot_svg):
-        assert_whole(draw(hidden, virtual=virtual), hidden, observed, virtual)
+    assert_whole(robot_svg(hidden, virtual=virtual), hidden, observed, virtual)
     assert_free(plan(hidden, virtual=virtual))
 
 
 @settings(max_examples=60, deadline=None)
 @given(strategies.mechanisms())
 def test_any_mechanism_can_be_drawn(mechanism: Mechanism) -> None:
-    for draw in (graph_svg, robot_svg):
-        assert_whole(draw(mechanism, observed=()), mechanism, set(), set())
+    assert_whole(robot_svg(mechanism, observed=()), mechanism, set(), set())
     assert_free(plan(mechanism, observed=()))
 
 
@@ -171,7 +166,7 @@ def test_what_is_in_no_leg_makes_one_group_of_all() -> None:
     slide = next(j for j in mechanism.joints.values() if one in j.links)
     bridge = type(slide)("bridge", JointType.SPHERICAL, one, two, slide.point)
     bridged = mechanism.changed(joints=[bridge])
-    assert_whole(graph_svg(bridged, observed=()), bridged, set(), set())
+    assert_whole(robot_svg(bridged, observed=()), bridged, set(), set())
     assert_free(plan(bridged, observed=()))
 
 
@@ -180,5 +175,5 @@ def test_virtual_chains_from_a_camera_on_a_leg_are_told_apart() -> None:
     assert hidden is not None
     found = plan(hidden, virtual=driven(hidden))
     assert [row.label for row in found.rows] == [None]
-    assert_whole(graph_svg(hidden, virtual=driven(hidden)), hidden, {"rod_1a", "rod_2a"}, driven(hidden))
+    assert_whole(robot_svg(hidden, virtual=driven(hidden)), hidden, {"rod_1a", "rod_2a"}, driven(hidden))
     assert_free(found)

@@ -58,7 +58,7 @@ def test_the_frame_moves_in_a_browser(found, tab: Tab, tmp_path: Path):
     tab.open(tmp_path / "cell.html", "document.querySelector('iframe').contentDocument.body?.dataset.ready === 'yes'")
     frame = tab.page.frames[1]
     before = frame.evaluate("document.getElementById('now').textContent")
-    frame.evaluate("""() => { const slider = document.querySelector('#sliders input');
+    frame.evaluate("""() => { const slider = document.querySelector('.sliders input');
                               slider.value = slider.max; slider.dispatchEvent(new Event('input')); }""")
     frame.wait_for_function("before => document.getElementById('now').textContent !== before", arg=before)
     assert tab.complaints == []

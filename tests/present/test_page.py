@@ -14,13 +14,11 @@ import numpy as np
 import pytest
 
 from browser import Tab
-from hrsynth.present.view import page
+from hrsynth.present.studio import saved as page
 from present.studio_client import soon
 from present.views import FIVE, seen, serving
 
 READY = "document.body.dataset.ready == 'yes'"
-PANEL = 300
-"""Width of the panel beside the picture (pixels)."""
 SIZE = {"width": 900, "height": 600}
 EMPTY = 12
 """Difference of a colour from that of its neighbour below within which nothing is drawn."""
@@ -28,9 +26,12 @@ EMPTY = 12
 
 def drawn(tab: Tab) -> np.ndarray:
     """The picture of the robot, once it is at rest."""
+    tab.page.add_style_tag(content="#tools { visibility: hidden } #foot { display: none }")
     tab.page.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
     tab.page.wait_for_timeout(100)
-    return tab.picture()[:, PANEL + 2 :].astype(int)
+    box = {key: round(value) for key, value in tab.page.locator("#pane").bounding_box().items()}
+    rows, columns = slice(box["y"], box["y"] + box["height"]), slice(box["x"], box["x"] + box["width"])
+    return tab.picture()[rows, columns].astype(int)
 
 
 def filled(picture: np.ndarray) -> float:
@@ -77,20 +78,19 @@ def test_the_page_of_a_robot_shows_it_and_its_sliders_move_it(name: str, tab: Ta
 
 
 @pytest.mark.browser
-def test_what_is_switched_off_is_gone(tab: Tab, tmp_path: Path):
+def test_either_robot_is_shown_alone_or_both_with_the_other_modes(tab: Tab, tmp_path: Path):
     file = tmp_path / "view.html"
     file.write_bytes(page.static(seen("quattro")))
     tab.page.set_viewport_size(SIZE)
     tab.open(file, READY)
     before = drawn(tab)
-    boxes = tab.page.locator("aside input[type=checkbox]")
-    assert boxes.count() == 3 + len(seen("quattro").mode_outlines)
-    for number in range(boxes.count()):
-        boxes.nth(number).uncheck()
+    assert tab.page.locator(".modes li").count() == len(seen("quattro").mode_outlines)
+    assert tab.page.evaluate("() => studio.stage.parts.ghosts.children.length") == len(seen("quattro").mode_outlines)
+    for layout in ("real", "hidden", "beside", "overlay"):
+        tab.page.evaluate("(value) => document.querySelector(`input[value=${value}]`).click()", layout)
         after = drawn(tab)
         assert changed(before, after) > 0.002
         before = after
-    assert filled(before) == 0
 
 
 @pytest.mark.browser
@@ -99,7 +99,7 @@ def test_the_panel_says_what_is_shown_and_fits_a_narrow_window(tab: Tab, tmp_pat
     file.write_bytes(page.static(seen("uranesx")))
     tab.page.set_viewport_size(SIZE)
     tab.open(file, READY)
-    text = tab.page.locator("aside").inner_text()
+    text = tab.page.locator("body").inner_text()
     assert all(machine.words in text for machine in seen("uranesx").machines)
     assert all(note in text for note in seen("uranesx").notes)
     assert "virtual actuator" in text
@@ -141,7 +141,7 @@ def test_with_a_server_sliders_move_the_robot_together(address: str, tab: Tab):
 def test_the_page_is_whole_and_asks_for_nothing():
     text = page.page(seen("rrrrr_m1"))
     outside = re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)
-    assert not re.search(r"(src|href)\s*=\s*[\"'](?!data:)", outside)
+    assert not re.search(r"(src|href)\s*=\s*[\"'](?!data:|#)", outside)
     assert text.count("<script") == 3
     assert "Three.js Authors" in text
     assert "The MIT License" in text

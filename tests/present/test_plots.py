@@ -13,7 +13,7 @@ import hrsynth
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import load
 from hrsynth.mechanism.pose import Pose
-from hrsynth.present import maps, plots
+from hrsynth.present import maps, palette, plots
 from hrsynth.present.paper import PNG, print_figure, settle
 from hrsynth.present.plots import MapPlane, round_ticks, tick_words
 from hrsynth.present.view.view import plane_normal
@@ -50,7 +50,7 @@ def test_notebooks_can_use_the_style():
 
     with matplotlib.style.context(plots.STYLE):
         cycle = [each["color"].lstrip("#").upper() for each in matplotlib.rcParams["axes.prop_cycle"]]
-    assert cycle == [colour.lstrip("#").upper() for colour in plots.COLOURS]
+    assert cycle == [colour.lstrip("#").upper() for colour in palette.SERIES]
 
 
 def test_notebooks_that_plot_use_it():

@@ -20,6 +20,7 @@ from hrsynth.cli import execute
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PlaneNotMet
 from hrsynth.families.formations import formation
+from hrsynth.present import palette
 from hrsynth.present.drawings import svg
 from hrsynth.present.report import figures, pages, parts
 from hrsynth.present.report.answer import set_rows
@@ -210,7 +211,7 @@ def contrast(one: str, other: str) -> float:
 
 
 def colours() -> dict[str, str]:
-    return dict(re.findall(r"--(\w+): (#[0-9a-f]+);", CSS))
+    return dict(re.findall(r"--(\w+): (#[0-9a-f]+);", palette.css()))
 
 
 def rules() -> Iterator[tuple[str, str]]:
@@ -220,7 +221,7 @@ def rules() -> Iterator[tuple[str, str]]:
         text = re.search(r"(?<![-\w])color: var\(--(\w+)\)", body)
         ground = re.search(r"background: var\(--(\w+)\)", body)
         if text:
-            for name in [ground[1]] if ground else ["paper", "pale"]:
+            for name in [ground[1]] if ground else ["face", "ground"]:
                 yield of[text[1]], of[name]
 
 
@@ -236,11 +237,11 @@ def test_text_stands_out_from_its_ground():
 
 
 def test_letters_and_lines_of_drawings_stand_out():
-    for ground in ("#ffffff", svg.PALE, svg.MOTOR, svg.TINT):
+    for ground in (svg.EMPTY, svg.PALE, *svg.FILLS.values()):
         assert contrast(svg.INK, ground) >= 4.5
-    assert contrast("#ffffff", svg.VIRTUAL) >= 4.5
+    assert contrast(svg.EMPTY, svg.VIRTUAL) >= 4.5
     assert contrast(svg.VIRTUAL, svg.PALE) >= 4.5
-    assert luminance(svg.MOTOR) > 2 * luminance(svg.VIRTUAL)
+    assert luminance(svg.VIRTUAL) > 2 * luminance(svg.MOTOR)
 
 
 @pytest.mark.slow

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from browser import Tab
-from hrsynth.present.view import page
+from hrsynth.present.studio import saved as page
 from present.views import moved, seen, turned
 
 pytestmark = pytest.mark.browser
 
 READY = "document.body.dataset.ready == 'yes'"
-SIZE = {"width": 900, "height": 600}
-PANEL = 300
+NAMES = "() => { Object.assign(window, { stage: studio.stage, scene: studio.scene }); }"
+SIZE = {"width": 1200, "height": 800}
 AT_REST = 700
 """Milliseconds in which a page at rest draws nothing."""
 STILL = (
@@ -34,6 +34,7 @@ def open_page(tab: Tab, tmp_path: Path) -> Callable[..., Tab]:
         file.write_bytes(page.static(seen(name)))
         tab.page.set_viewport_size(size)
         tab.open(file, READY)
+        tab.page.evaluate(NAMES)
         return tab
 
     return opened
@@ -51,6 +52,13 @@ def on_page(tab: Tab, point: Any) -> tuple[float, float]:
             [float(v) for v in point],
         )
     )
+
+
+def pane(tab: Tab) -> dict[str, float]:
+    """Where the picture is on the page."""
+    found = tab.page.locator("#pane").bounding_box()
+    assert found is not None
+    return found
 
 
 def ask(tab: Tab, script: str) -> Any:
@@ -74,7 +82,8 @@ def test_a_leg_that_is_clicked_is_told(open_page, name: str):
         leg, point = middle_of_arrow(name, number)
         tab.page.mouse.click(*on_page(tab, point))
         assert ask(tab, "told.pop()") == ["leg", leg]
-    tab.page.mouse.click(PANEL + 8, 8)
+    box = pane(tab)
+    tab.page.mouse.click(box["x"] + 8, box["y"] + box["height"] - 8)
     assert ask(tab, "told.length") == 0
 
 
@@ -99,6 +108,7 @@ def test_a_finger_picks_a_leg_beside_which_it_comes_down(browser: Any, tmp_path:
     file = tmp_path / "page.html"
     file.write_bytes(page.static(seen("3rrr_m1")))
     tab.open(file, READY)
+    ask(tab, NAMES)
     ask(tab, "stage.ghosts([]); window.told = []; stage.onpick = (...what) => told.push(what); 0")
     leg, point = middle_of_arrow("3rrr_m1", 0)
     x, y = on_page(tab, point)
@@ -126,7 +136,7 @@ def test_a_mode_that_is_clicked_is_told_by_its_label(open_page):
 
 def test_the_mode_where_the_robot_is_has_no_outline(open_page):
     tab = open_page("quattro")
-    here = "{label: '9', places: scene.home.real.map((place) => [...place]), reachable: true}"
+    here = "{label: '9', places: scene.state.real.map((place) => [...place]), reachable: true}"
     ask(tab, f"stage.ghosts([{here}, scene.ghosts[0]])")
     assert ask(tab, "stage.parts.ghosts.children.map(({ visible }) => visible)") == [False, True]
     ask(tab, "stage.state(scene.sliders[0].states[0])")
@@ -137,10 +147,10 @@ def test_a_hidden_robot_of_unknown_place_is_not_shown_where_it_was(open_page):
     tab = open_page("quattro")
     shown = "['real', 'hidden'].map((key) => stage.machines[key].group.visible)"
     assert ask(tab, shown) == [True, True]
-    ask(tab, "stage.state({ real: scene.sliders[0].states[0].real, error: scene.home.error })")
+    ask(tab, "stage.state({ real: scene.sliders[0].states[0].real, error: scene.state.error })")
     assert ask(tab, shown) == [True, False]
     assert ask(tab, "stage.machines.real.looks.leg.opacity") == 1, "the real robot is no glass then"
-    ask(tab, "stage.state(scene.home)")
+    ask(tab, "stage.state(scene.state)")
     assert ask(tab, shown) == [True, True]
 
 
@@ -324,12 +334,10 @@ def test_the_legend_holds_all_that_is_drawn_and_no_more(open_page):
         "stage.layout('hidden')",
         "stage.layout('beside')",
         "stage.watch(['1'])",
-        "stage.goal(scene.home)",
+        "stage.goal(scene.state)",
         "stage.lost([{twist: [0, 0, 1, 0, 0, 0], point: [0, 0, 0]}])",
         "stage.ellipsoid({center: [0, 0, 0], axes: [[0.001, 0, 0], [0, 0.001, 0], [0, 0, 0.001]]})",
         "stage.ghosts([])",
-        "stage.directions(false)",
-        "stage.layout('none')",
     ]
     for script in scripts:
         ask(tab, script)
@@ -355,8 +363,8 @@ def test_the_scale_says_its_thresholds_and_where_the_platform_is(open_page):
     assert [key for key, each in legend.items() if each["now"]] == [f"step{error['step']}"]
     assert "1 to 3 mm per 0.1°" in legend["step1"]["words"]
     assert "lost" in legend["step4"]["words"]
-    assert error["words"] in tab.page.locator("aside").inner_text()
-    ask(tab, "stage.state({ ...scene.home, error: { step: null } })")
+    assert error["words"] in tab.page.locator("body").inner_text()
+    ask(tab, "stage.state({ ...scene.state, error: { step: null } })")
     (now,) = [each["key"] for each in ask(tab, "stage.legend()") if each["now"]]
     assert now == "unknown"
 
@@ -372,7 +380,8 @@ def test_two_robots_beside_each_other_do_not_touch(open_page, size: dict[str, in
       return [Sight.span(corners, across), Sight.span(corners, up)]; })""",
     )
     (wide, high), (wide1, high1) = boxes
-    apart = wide[1] < wide1[0] if size is SIZE else high1[1] < high[0]
+    across = pane(tab)["width"] >= pane(tab)["height"]
+    apart = wide[1] < wide1[0] if across else high1[1] < high[0]
     assert apart, boxes
     rest(tab)
     box = tab.page.locator("main canvas").bounding_box()
@@ -382,7 +391,7 @@ def test_two_robots_beside_each_other_do_not_touch(open_page, size: dict[str, in
       .map((p) => p.project(stage.sight.camera)).every(({ x, y }) => Math.abs(x) < 1 && Math.abs(y) < 1))()""",
     )
     assert inside
-    assert box["width"] == size["width"] - (PANEL if size is SIZE else 0)
+    assert box["width"] == pane(tab)["width"]
 
 
 def test_the_picture_is_a_png_as_large_as_the_pane(open_page):
@@ -395,7 +404,11 @@ def test_the_picture_is_a_png_as_large_as_the_pane(open_page):
       const data = canvas.getContext("2d").getImageData(2, 2, 1, 1).data;
       return [[image.width, image.height], blob.type, [...data]]; })""",
     )
-    assert (size, kind, corner) == ([SIZE["width"] - PANEL, SIZE["height"]], "image/png", [245, 247, 250, 255])
+    assert (size, kind, corner) == (
+        [round(pane(tab)["width"]), round(pane(tab)["height"])],
+        "image/png",
+        [245, 247, 250, 255],
+    )
 
 
 def test_without_webgl_one_line_says_so_and_the_words_stay(tab: Tab, tmp_path: Path):
@@ -405,23 +418,24 @@ def test_without_webgl_one_line_says_so_and_the_words_stay(tab: Tab, tmp_path: P
     file = tmp_path / "page.html"
     file.write_bytes(page.static(seen("quattro")))
     tab.open(file, READY)
-    assert "WebGL" in tab.page.get_by_role("alert").inner_text()
+    ask(tab, NAMES)
+    assert "WebGL" in tab.page.locator(".stage [role=alert]").inner_text()
     tab.page.locator("aside input[type=range]").first.press("ArrowLeft")
     tab.page.get_by_role("button", name="Home").click()
     ask(tab, "stage.layout('beside'); stage.gizmo(true); stage.lost([{twist: [1, 0, 0, 0, 0, 0], point: [0, 0, 0]}])")
     assert ask(tab, "stage.picture()") is None
-    assert "virtual actuator" in tab.page.locator("aside").inner_text()
+    assert "virtual actuator" in tab.page.locator("body").inner_text()
 
 
 def test_a_graphics_card_that_goes_is_told_and_comes_back(open_page):
     tab = open_page("3rrr_m1")
     ask(tab, "window.card = stage.renderer.getContext().getExtension('WEBGL_lose_context'); card.loseContext()")
-    tab.page.get_by_role("alert").wait_for()
-    assert "graphics context" in tab.page.get_by_role("alert").inner_text()
+    tab.page.locator(".stage [role=alert]").wait_for()
+    assert "graphics context" in tab.page.locator(".stage [role=alert]").inner_text()
     ask(tab, "card.restoreContext()")
-    tab.page.wait_for_function("!document.querySelector('[role=alert]')")
+    tab.page.wait_for_function("!document.querySelector('.stage [role=alert]')")
     rest(tab)
-    picture = tab.picture()[:, PANEL + 2 :].astype(int)
+    picture = tab.picture()[: round(pane(tab)["height"]), : round(pane(tab)["width"])].astype(int)
     assert np.abs(picture - picture[:, :1]).max() > 50
 
 
@@ -445,6 +459,8 @@ def test_what_lies_on_the_pane_covers_nothing_of_the_robot(open_page, size: dict
                         const height = stage.canvas.clientHeight;
                         return [(1 - Math.max(...seen)) / 2 * height, (1 + Math.min(...seen)) / 2 * height]; })()"""
     top, bottom = ask(tab, edges)
+    ask(tab, "stage.over = []; stage.fit()")
+    top, bottom = ask(tab, edges)
     assert top == pytest.approx(bottom, abs=0.1 * size["height"])
     ask(
         tab,
@@ -466,7 +482,7 @@ def test_another_robot_takes_the_place_of_the_first_and_gives_back_what_it_held(
     held = ask(tab, "[stage.renderer.info.memory.geometries, stage.renderer.info.memory.textures]")
     for _ in range(4):
         ask(tab, "stage.lost([{twist: [0, 0, 1, 0, 0, 1], point: [0, 0, 0]}]); stage.plane(null)")
-        ask(tab, f"stage.plane({json.dumps(PLANE)}); stage.goal(scene.home)")
+        ask(tab, f"stage.plane({json.dumps(PLANE)}); stage.goal(scene.state)")
         rest(tab)
         ask(tab, "stage.scene(scene); stage.ghosts(scene.ghosts); stage.reduced = true")
         rest(tab)

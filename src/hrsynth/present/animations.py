@@ -16,12 +16,14 @@ from ..geometry.vectors import Array, inverse
 from ..progress import tell
 from ..simulation.camera import Camera, Cylinder, cylinders, facing, rods_in_frame
 from ..simulation.mockup import rods as rods_of
-from ..simulation.pictures import COLOURS, GREY, LegRenderer
+from ..simulation.pictures import GREY, LegRenderer
 from ..simulation.result import Servo
 from ..simulation.track import TYPE_2
 from ..tolerances import REST_OF_RUN
+from . import palette
 from .plots import empty_figure, in_style, pose_words
 from .runs import ENDS, LEAST_TURN, until
+from .text.tables import name_all
 
 FRAMES, PAUSE = 50, 12
 """Pictures of the run, and how often the last one is shown on."""
@@ -39,6 +41,8 @@ AFTER = 3
 """Pictures during which a crossing is told."""
 SHADES = 32
 """Colours of the file."""
+WATCHED = np.array([[int(palette.colour("watched")[i : i + 2], 16) / 255 for i in (1, 3, 5)]])
+"""What the watched legs are drawn in, (1, 3)."""
 LINE = 38
 """Letters of a line of words."""
 
@@ -52,7 +56,11 @@ def animation(found: Servo) -> bytes:
     require_legs(setting)
     question = setting.samples.question
     stage = LegRenderer(
-        setting.mechanism, _camera(found), question.reference, cylinders(setting.mechanism, question.observations)
+        setting.mechanism,
+        _camera(found),
+        question.reference,
+        cylinders(setting.mechanism, question.observations),
+        colours=WATCHED,
     )
     wanted = _lit(stage.picture(found.target.pose))
     paper = np.where(_bare(wanted)[..., None], 1.0, 1.0 - WANTED * (1.0 - wanted))
@@ -124,16 +132,8 @@ class Sheet:
         figure.text(left, 0.945, found.setting.robot.name, fontsize=17, fontweight="bold", va="center")
         figure.text(left, 0.895, f"from {pose_words(found.start)}\nto {pose_words(found.goal)}", fontsize=9, va="top")
         self.words = figure.text(left, 0.79, "", fontsize=14, va="top", linespacing=1.35)
-        for k, leg in enumerate(found.setting.labels):
-            figure.text(left + 0.075 * (k % 4) + 0.016, 0.53 - 0.035 * (k // 4), f"leg {leg}", fontsize=10, va="center")
-            figure.text(
-                left + 0.075 * (k % 4),
-                0.53 - 0.035 * (k // 4),
-                "■",
-                fontsize=11,
-                va="center",
-                color=COLOURS[k % len(COLOURS)],
-            )
+        figure.text(left, 0.53, "■", fontsize=11, va="center", color=palette.colour("watched"))
+        figure.text(left + 0.016, 0.53, name_all("leg", found.setting.labels), fontsize=10, va="center")
         self.marks: list[Any] = []
         for bottom, values, label in (
             (0.29, found.errors.max(axis=1), "largest error of a direction"),

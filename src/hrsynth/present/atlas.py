@@ -14,14 +14,18 @@ from ..analysis.aspects.three_cranks import CrankPlace, mode_counts
 from ..analysis.aspects.words import SAME, SEPARATED, UNDECIDED
 from ..errors import BadRequest
 from ..geometry.vectors import Array
-from . import plots
+from . import palette, plots
 from .modes import why_undrawn
 from .paper import PNG, Paper, print_figure
-from .plots import COLOURS, cell_edges, entry, in_style, panels
+from .plots import cell_edges, entry, in_style, panels
 
-CELLS = {SAME: ("#b9dcb1", "="), SEPARATED: ("#f2c0b0", "|"), UNDECIDED: ("#e3e3e3", "?")}
-CURVE, CUSP, NODE = "black", COLOURS[1], COLOURS[2]
-SHADES = ("white", "#e8eef4", "#c9d9e8", "#9dbbd6")
+CELLS = {
+    SAME: (palette.tint(palette.PAGE["good"]), "="),
+    SEPARATED: (palette.tint(palette.PAGE["wrong"]), "|"),
+    UNDECIDED: (palette.PAGE["line"], "?"),
+}
+CURVE, CUSP, NODE = "black", palette.SERIES[1], palette.SERIES[2]
+SHADES = ("white", *(palette.tint(palette.SERIES[0], share) for share in (0.1, 0.22, 0.4)))
 """No mode, two, four, six."""
 LEAST_PANEL = 3.0
 """The least width (inches) of one of several drawings."""
@@ -87,7 +91,7 @@ def picture(found: Atlas, drawn: DrawnSection, paper: Paper = PNG) -> bytes:
 def _colour(found: Atlas, number: int) -> str:
     """One colour for all modes of an aspect."""
     groups = [k for k, group in enumerate(found.groups) if number in group]
-    return COLOURS[groups[0] % len(COLOURS)] if groups else "0.6"
+    return palette.SERIES[groups[0] % len(palette.SERIES)] if groups else "0.6"
 
 
 def _table(place: Any, found: Atlas) -> None:
@@ -143,7 +147,7 @@ def _curves(axes: Any, found: Atlas, drawn: HeldLegSection, modes: dict[int, Cra
             there.plot(*_degrees(one - first, other - second), zorder=4, **style)
             if mark == "o":
                 here.plot(*_degrees(point.crank - crank, point.turn), zorder=4, **style)
-    there.plot(0, 0, "*", color="gold", markeredgecolor="black", markersize=15, zorder=5)
+    there.plot(0, 0, "*", color=palette.colour("goal"), markeredgecolor="black", markersize=15, zorder=5)
     for number, at in modes.items():
         x, y = _degrees(float(np.angle(at.cranks[0])) - crank, at.turn)
         here.plot(
@@ -167,7 +171,14 @@ def _curves(axes: Any, found: Atlas, drawn: HeldLegSection, modes: dict[int, Cra
         place.yaxis.set_major_locator(MultipleLocator(30 if np.ptp(shown[1]) < 240 else 60))
     kinds = [
         entry("Type 2 singularities", color=CURVE, linewidth=1.2),
-        entry("the goal's directions", linestyle="", marker="*", color="gold", markeredgecolor="black", markersize=11),
+        entry(
+            "the goal's directions",
+            linestyle="",
+            marker="*",
+            color=palette.colour("goal"),
+            markeredgecolor="black",
+            markersize=11,
+        ),
     ]
     nodes = [place for place, _ in drawn.nodes]
     for points, colour, mark, name in ((drawn.cusps, CUSP, "o", "cusp"), (nodes, NODE, "s", "node")):

@@ -15,37 +15,38 @@ from ..simulation.ending import ANTIPODAL, BOUNDARY, GOAL, MINIMUM, MODE, SIGHT,
 from ..simulation.endings.basins import LETTERS, NOT_REACHED, BasinEnd, Basins, place_of
 from ..simulation.endings.flow import Flags, Places
 from ..tolerances import IN_PLANE
-from . import plots
+from . import palette, plots
 from .paper import PNG, Paper, print_figure
 from .plots import (
-    COLOURS,
     MapPlane,
     cell_edges,
     entry,
     heading,
     in_style,
-    layer_title,
     missing_entry,
     panels,
     tick_values,
 )
+from .pose_map import PoseMap
 from .runs import ENDS
 from .sketch import axis_label
 
 SHADES = {
-    GOAL: (COLOURS[2], "#7FCEB9"),
-    MODE: (COLOURS[0], COLOURS[5], "#B9DDF3"),
-    ANTIPODAL: (COLOURS[3], "#E8C4D8"),
-    MINIMUM: (COLOURS[4], "#F5D48A"),
-    BOUNDARY: (COLOURS[1], "#EFB48D"),
-    SIGHT: ("#6B4A2B",),
+    GOAL: (palette.tint(palette.colour("goal"), 0.55), palette.tint(palette.colour("goal"), 0.25)),
+    MODE: (
+        palette.colour("mode"),
+        palette.tint(palette.colour("mode"), 0.6),
+        palette.tint(palette.colour("mode"), 0.3),
+    ),
+    ANTIPODAL: (palette.SERIES[3], palette.tint(palette.SERIES[3])),
+    MINIMUM: (palette.SERIES[4], palette.tint(palette.SERIES[4])),
+    BOUNDARY: (palette.SERIES[1], palette.tint(palette.SERIES[1])),
+    SIGHT: (palette.SERIES[5],),
     TIME: ("0.3",),
     UNDECIDED: ("0.5",),
 }
 """Colours of the ends of each kind, the largest first."""
 MARKS = {GOAL: "*", MODE: "o", ANTIPODAL: "X", MINIMUM: "v", BOUNDARY: "s", SIGHT: "^", UNDECIDED: "P", TIME: "d"}
-LEAST_MAP = 2.4
-"""The least width (inches) of one of several maps."""
 ROOM = 3.0
 """Cells from the border of a basin at which its letter has room."""
 SEEN, RING = 0.05, 26
@@ -95,7 +96,6 @@ def picture(found: Basins, paper: Paper = PNG) -> bytes:
         else:
             drawn |= _ends(place, plane, found, level)
             larger |= _draw_certified(place, plane, found, level)
-            plane.finish(place, plane.x, plane.y)
     entries = [
         Patch(facecolor=shade, label=_describe_end(letter, each))
         for letter, each, shade in zip(LETTERS, found.ends, shades, strict=False)
@@ -180,31 +180,14 @@ def _ends_on_line(place: Any, found: Basins) -> set[tuple[str, bool]]:
 
 def _maps(found: Basins, paper: Paper) -> tuple[Any, list[Any]]:
     """The figure of a plane or a box, and its layers: axes, plane, cells, which are damped, value of the third part."""
-    pname, ps = (*found.grid.axes, ("", np.zeros(1)))[2]
-    plane = MapPlane.of(found.grid.axes, found.setting.motion, 0.4, 1.6)
-    columns = paper.columns(min(len(ps), 3), LEAST_MAP)
-    rows, size = -(-len(ps) // columns), 5.6 if len(ps) == 1 else 3.4
-    figure, axes = panels(
-        rows,
-        columns,
-        size * columns + 1.0,
-        (size * plane.tall + 0.7) * rows + 0.8,
-        paper,
-        (1.2, 0.8 + 0.7 * rows),
-        LEAST_MAP if columns > 1 else 0.0,
-    )
-    shape = (*found.grid.shape[:2], -1)
-    cells, damped = found.cells.reshape(shape), found.damped.reshape(shape)
-    layers = []
-    for k, place in enumerate(axes):
-        place.set_visible(k < len(ps))
-        if k < len(ps):
-            plots.outer(place, k, columns, len(ps))
-            place.locator_params(axis="x", nbins=8 if columns == 1 else 4)
-            if pname:
-                layer_title(place, pname, tick_values(pname, ps)[k])
-            layers.append((place, plane, cells[..., k], damped[..., k], float(ps[k]) if pname else None))
-    return figure, layers
+    made = PoseMap.of(found.grid, found.setting.motion, paper)
+    layers = [
+        (place, made.plane, cells, damped, level)
+        for (place, cells), (_, damped), level in zip(
+            made.layers(found.cells), made.layers(found.damped), made.levels, strict=True
+        )
+    ]
+    return made.figure, layers
 
 
 def _layer(place: Any, plane: MapPlane | None, cells: Places, damped: Flags, shades: list[str]) -> None:

@@ -8,8 +8,9 @@ import numpy as np
 
 from ..kinematics.configuration import ClosedConfiguration
 from ..simulation.endings.rests import CRITICAL, STABLE, Endings, RestPoint
+from . import palette
 from .paper import PNG, Paper, legend_within, print_figure, settle_title
-from .plots import COLOURS, empty_figure, entry, in_style, pose_words
+from .plots import empty_figure, entry, in_style, pose_words
 from .skeleton import legs_of, outline
 from .sketch import Sketch
 from .view.view import plane_normal
@@ -19,10 +20,10 @@ WIDE, TALL, EDGE, SCALES = 7.2, 6.4, 0.2, 0.8
 WITHIN = 1.6
 """How far from the middle of the robot a rest may be to be drawn, as a multiple of the robot's size."""
 LOOKS: dict[str, dict[str, Any]] = {
-    "goal": {"color": COLOURS[2], "marker": "*", "markersize": 13},
-    "mode": {"color": COLOURS[0], "marker": "D", "markersize": 8},
-    "antipodal": {"color": COLOURS[3], "marker": "s", "markersize": 8},
-    "critical": {"color": COLOURS[1], "marker": "o", "markersize": 8},
+    "goal": {"color": palette.colour("goal"), "marker": "*", "markersize": 13},
+    "mode": {"color": palette.colour("mode"), "marker": "D", "markersize": 8},
+    "antipodal": {"color": palette.SERIES[3], "marker": "s", "markersize": 8},
+    "critical": {"color": palette.SERIES[1], "marker": "o", "markersize": 8},
     "other": {"color": "0.6", "marker": "x", "markersize": 5},
 }
 BASE: dict[str, Any] = {"color": "black", "marker": "s", "markersize": 4}

@@ -19,12 +19,11 @@ from ..errors import BadRequest
 from ..geometry.vectors import Array
 from ..mechanism.pose import PARTS
 from ..tolerances import DARKEST_DISTANCE, DISTANCE_FLOOR
-from . import plots
+from . import palette, plots
 from .paper import PNG, Paper, print_figure
 from .plots import (
     MapPlane,
     along,
-    cell_edges,
     entry,
     heading,
     in_style,
@@ -34,6 +33,7 @@ from .plots import (
     tick_values,
     tick_words,
 )
+from .pose_map import PoseMap
 
 if TYPE_CHECKING:
     from ..analysis.accuracy.accuracy import Accuracy
@@ -54,13 +54,11 @@ MARKS = {
 }
 """Marks of singular poses by their state."""
 VALUE = "smallest singular value of Mᵀ"
-LOCI = {"hidden robot": ("crimson", "solid", "o"), "real robot": ("royalblue", "dashed", "s")}
+LOCI = {"hidden robot": (palette.colour("actuator"), "solid", "o"), "real robot": (palette.PAGE["ink"], "dashed", "s")}
 NEAR_TYPE_1 = 0.5
 """Fraction of its median to which the distance to Type 1 falls at a boundary of that kind."""
 ERRORS = "cividis"
 """A scale that readers with any colour vision see in the same order."""
-LEAST_MAP, LEAST_CURVE = 2.1, 4.4
-"""The least width (inches) of one of several maps, and of a map with a scale of its own."""
 STROKES = (("black", 3.4), ("white", 1.6))
 """Colours and widths of a line that is seen on any colour, drawn one over the other."""
 HIGHEST = 30.0
@@ -89,7 +87,7 @@ def distance_map(found: Check, paper: Paper = PNG) -> bytes:
     entries = [missing_entry()] if UNREACHABLE in grid.states else []
     entries += _robot(figure, grid.grid, found.setting)
     entries += [
-        entry(label, linestyle="", marker=mark, color="red", markeredgecolor="white")
+        entry(label, linestyle="", marker=mark, color=palette.colour("step4"), markeredgecolor="white")
         for state, (mark, label) in MARKS.items()
         if state in grid.states
     ]
@@ -115,40 +113,15 @@ def _robot(figure: Any, grid: Grid, setting: ObservedRobot) -> list[Any]:
 def _distance_maps(
     grid: GridCheck, numbers: Array, states: NDArray[np.str_], motion: PlatformMotion, paper: Paper
 ) -> Any:
-    from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm
 
-    pname, ps = (*grid.grid.axes, ("", np.zeros(1)))[2]
-    shape = (*grid.grid.shape[:2], -1)
-    numbers, states = numbers.reshape(shape), states.reshape(shape)
-    columns = paper.columns(min(len(ps), 4), LEAST_MAP)
-    rows = -(-len(ps) // columns)
-    size = 3.6 if columns > 1 else 5.6
-    plane = MapPlane.of(grid.grid.axes, motion, 0.3, 2.0)
-    figure, axes = panels(
-        rows,
-        columns,
-        size * columns + 1.4,
-        (size * plane.tall + 0.7) * rows + 0.8,
-        paper,
-        (1.5 + 0.2 * columns, 0.8 + 0.7 * rows),
-        LEAST_MAP if columns > 1 else 0.0,
-    )
-    low, high, ticks = _scale(numbers)
+    made = PoseMap.of(grid.grid, motion, paper)
+    low, high, _ = _scale(numbers)
     norm = LogNorm(low, high)
-    for k, place in enumerate(axes[: len(ps)]):
-        _distances(place, plane, np.maximum(numbers[..., k], low), states[..., k], norm)
-        plane.finish(place)
-        plots.outer(place, k, columns, len(ps))
-        if pname:
-            plots.layer_title(place, pname, tick_values(pname, ps)[k])
-    for place in axes[len(ps) :]:
-        place.set_visible(False)
-    below = "min" if np.nanmin(numbers) < low else "neither"
-    bar = figure.colorbar(ScalarMappable(norm, "viridis"), ax=list(axes), label=f"{VALUE} (logarithmic)", extend=below)
-    bar.set_ticks(list(ticks), labels=tick_words(ticks))
-    bar.minorticks_off()
-    return figure
+    for (place, distances), (_, state) in zip(made.layers(numbers), made.layers(states), strict=True):
+        _distances(place, made.plane, np.maximum(distances, low), state, norm)
+    made.scale(norm, "viridis", VALUE, "min" if np.nanmin(numbers) < low else "neither")
+    return made.figure
 
 
 def _distances(place: Any, plane: MapPlane, numbers: Array, states: NDArray[np.str_], norm: Any) -> None:
@@ -159,7 +132,12 @@ def _distances(place: Any, plane: MapPlane, numbers: Array, states: NDArray[np.s
     for state, (mark, _) in MARKS.items():
         i, j = np.nonzero(states == state)
         place.scatter(
-            *plane.at(plane.x[i], plane.y[j]), marker=mark, s=26, color="red", edgecolor="white", linewidth=0.6
+            *plane.at(plane.x[i], plane.y[j]),
+            marker=mark,
+            s=26,
+            color=palette.colour("step4"),
+            edgecolor="white",
+            linewidth=0.6,
         )
 
 
@@ -179,7 +157,7 @@ def _distance_curve(grid: GridCheck, numbers: Array, states: NDArray[np.str_], p
             np.fmax(numbers[hit], floor),
             marker=mark,
             s=36,
-            color="red",
+            color=palette.colour("step4"),
             edgecolor="white",
             linewidth=0.6,
             zorder=3,
@@ -275,7 +253,7 @@ def _drawn_locus(place: Any, plane: MapPlane, field: SingularityMap, name: str) 
 
 
 def _boundary(place: Any, plane: MapPlane, drawn: Locus) -> list[Any]:
-    """The reached poses next to others that are not, those near a Type 1 singularity orange; what the legend says."""
+    """The reached poses next to others that are not, in a colour near a Type 1 singularity; what the legend says."""
     reached = np.isfinite(drawn.hidden.type2)
     padded = np.pad(reached, 1, mode="edge")
     inside = padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
@@ -288,7 +266,7 @@ def _boundary(place: Any, plane: MapPlane, drawn: Locus) -> list[Any]:
             near |= np.min(around, axis=0) < NEAR_TYPE_1 * np.nanmedian(field.type1)
     entries = []
     for cells, colour, words in (
-        (border & near, "darkorange", "Type 1 boundary"),
+        (border & near, palette.SERIES[1], "Type 1 boundary"),
         (border & ~near, "black", "other limit of reach"),
     ):
         i, j = np.nonzero(cells)
@@ -327,55 +305,22 @@ def _error_maps(
     field: ErrorField, shown: list[tuple[Array, str]], motion: PlatformMotion, paper: Paper
 ) -> tuple[Any, bool]:
     """The figure, and whether a place where a freedom is lost is in it."""
-    from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm
 
-    pname, ps = (*field.grid.axes, ("", np.zeros(1)))[2]
-    flat = field.grid.ndim == 2
-    plane = MapPlane.of(field.grid.axes, motion, 0.4, 1.6)
-    size = 5.0 if flat else 3.0
-    columns = paper.columns(len(shown), LEAST_CURVE) if flat else paper.columns(len(ps), LEAST_MAP)
-    each = -(-len(ps) // columns)
-    rows = -(-len(shown) // columns) if flat else len(shown) * each
-    figure, axes = panels(
-        rows,
-        columns,
-        size * columns + (1.4 * columns if flat else 1.4),
-        (size * plane.tall + 0.8) * rows + (0.5 if flat else 0.0),
-        paper,
-        (1.9 * columns if flat else 1.5 + 0.2 * columns, 0.8 * rows + 0.5),
-        LEAST_CURVE if flat else LEAST_MAP,
-    )
-    locus = False
+    made = PoseMap.of(field.grid, motion, paper, len(shown))
+    plane, flat, locus = made.plane, field.grid.ndim == 2, False
     for number, (values, label) in enumerate(shown):
         low, high = _ends(values)
         norm = LogNorm(low, high)
-        places = axes[number : number + 1] if flat else axes[number * each * columns : (number + 1) * each * columns]
-        for place in places[len(ps) :]:
-            place.set_visible(False)
-        for k, place in enumerate(places[: len(ps)]):
-            layer = values if flat else values[..., k]
+        for k, (place, layer) in enumerate(made.layers(values, number)):
             plane.cells(place, np.where(np.isinf(layer), high, layer), norm=norm, cmap=ERRORS)
             missing = np.isnan(layer)
             if missing.any() and not missing.all():
                 plane.contour(place, missing.astype(float), 0.5, "black", 1.6)
             if not flat and field.determinant is not None:
                 locus |= _draw_loss(place, plane, field.determinant[..., k])
-            plane.finish(place, cell_edges(plane.x), cell_edges(plane.y))
-            plots.outer(place, k, columns, len(ps))
-            if pname:
-                plots.layer_title(place, pname, tick_values(pname, ps)[k])
-        bar = figure.colorbar(
-            ScalarMappable(norm, ERRORS),
-            ax=list(places),
-            label=f"{label}, logarithmic",
-            extend="max" if np.nanmax(values) > high else "neither",
-            shrink=0.9,
-        )
-        ticks = round_ticks(low, high) if high > 1.3 * low else np.array([np.nanmin(values)])
-        bar.set_ticks(list(ticks), labels=tick_words(ticks))
-        bar.minorticks_off()
-    return figure, (flat and _locus(field, axes[: len(shown)], plane)) or locus
+        made.scale(norm, ERRORS, label, "max" if np.nanmax(values) > high else "neither", number)
+    return made.figure, (flat and _locus(field, [place for (place,) in made.maps], plane)) or locus
 
 
 def _ends(values: Array, highest: float = HIGHEST) -> tuple[float, float]:

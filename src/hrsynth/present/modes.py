@@ -12,6 +12,7 @@ import numpy as np
 from ..analysis.modes.modes import AssemblyModes
 from ..errors import BadRequest
 from ..geometry.vectors import Array
+from . import palette
 from .paper import PNG, Paper, legend_within, print_figure, settle_title, wrap
 from .plots import empty_figure, entry, in_style
 from .scenes import CLOSES, GOAL, NEAR, OPEN, UNKNOWN, ModesScene, Placed, scene
@@ -25,11 +26,11 @@ MARKS = {
     NEAR: ("D", 7.0, "near mode"),
 }
 COLOURS = (
-    "tab:orange",
+    palette.colour("goal"),
     "tab:green",
     "tab:red",
     "tab:purple",
-    "saddlebrown",
+    "tab:orange",
     "deeppink",
     "darkcyan",
     "olive",

@@ -380,14 +380,14 @@ OUTPUTS = {
         (
             File(
                 "cannot write the view",
-                dict.fromkeys(HTML, "view.page:static"),
+                dict.fromkeys(HTML, "studio.saved:static"),
                 "The view",
                 "Write a page that needs no server (.html).",
                 "static",
                 allowed=".html",
             ),
         ),
-        inline="view.page:inline",
+        inline="studio.saved:inline",
     ),
 }
 """The outputs by the name under which a result is shown (:attr:`hrsynth.results.Result.shown_as`): that of its

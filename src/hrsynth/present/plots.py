@@ -23,8 +23,6 @@ from .view.view import plane_normal
 
 STYLE = "hrsynth.present.style"
 """The one style of all plots, ``style.mplstyle`` of this folder."""
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-"""Its colours, which colour-blind readers tell apart."""
 PAD = 0.07
 """Left free about axes, titles and legends (inches)."""
 FEWEST_TICKS = 3

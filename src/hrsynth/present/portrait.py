@@ -13,6 +13,7 @@ from ..analysis.observed import ObservedRobot
 from ..geometry.vectors import Array
 from ..mechanism import Mechanism
 from .drawings import svg
+from .palette import PAGE
 from .sketch import Sketch
 from .view.shapes import BASE, LEG, MOTOR, PLATFORM, RADIUS, Drawer
 from .view.view import plane_normal
@@ -21,9 +22,9 @@ TRAVEL = 0.3
 """Half of a rail that is drawn (characteristic lengths)."""
 SEEN = "seen"
 """A link whose direction is watched."""
-STROKES = {BASE: ("#7a828b", 2.0), LEG: ("#4a4f55", 3.0), PLATFORM: ("#1f4e8c", 3.4), SEEN: (svg.VIRTUAL, 4.6)}
+STROKES = {BASE: (PAGE["edge"], 2.0), LEG: (PAGE["soft"], 3.0), PLATFORM: (svg.INK, 3.4), SEEN: (svg.WATCHED, 4.6)}
 """Colour and width of what a link is (pixels at the full size of a drawing)."""
-FILLS = {BASE: "#eceff2", PLATFORM: "#c9dcf2"}
+FILLS = {BASE: PAGE["ground"], PLATFORM: PAGE["line"]}
 DIGITS = 4
 """Significant decimals of a drawing's size in what a page is given."""
 
@@ -116,8 +117,8 @@ class Portrait:
         legs = sum(mark.role == SEEN for mark in self.marks)
         motors = sum(mark.role == MOTOR for mark in self.marks)
         return (
-            f"{self.name} at its zero configuration, the platform blue, {motors} motors dark"
-            + (", the watched segments orange" if legs else "")
+            f"{self.name} at its zero configuration, the platform dark, {motors} motors green"
+            + (", the watched segments blue" if legs else "")
             + "."
         )
 
@@ -142,7 +143,7 @@ def _draw_mark(mark: Mark, at: list[svg.Place], thin: float) -> str:
         return svg.element(
             "path",
             d=svg.lines([at]) + "Z",
-            fill=FILLS.get(mark.role, "#fff"),
+            fill=FILLS.get(mark.role, svg.EMPTY),
             stroke=colour,
             stroke_width=wide * thin,
             stroke_linejoin="round",
@@ -151,10 +152,10 @@ def _draw_mark(mark: Mark, at: list[svg.Place], thin: float) -> str:
     if mark.kind == "line":
         colour, wide = STROKES[mark.role]
         way = svg.lines([at])
-        return svg.element("path", d=way, stroke="#fff", stroke_width=(wide + 3) * thin) + svg.element(
+        return svg.element("path", d=way, stroke=svg.EMPTY, stroke_width=(wide + 3) * thin) + svg.element(
             "path", d=way, stroke=colour, stroke_width=wide * thin, stroke_linecap="round"
         )
-    fill = svg.INK if mark.role == MOTOR else "#fff"
+    fill = svg.MOTOR if mark.role == MOTOR else svg.EMPTY
     if mark.kind == "sleeve":
         way = svg.lines([at])
         return svg.element("path", d=way, stroke=svg.INK, stroke_width=13 * thin) + svg.element(

@@ -18,8 +18,8 @@ from hrsynth.cli import main
 from hrsynth.errors import BadRequest, HrsynthError
 from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.present.studio.desk import Desk
-from hrsynth.present.studio.scale import CONE_TEXT, LOST, error, round_digits
 from hrsynth.present.text.tables import NOT_BOUNDED
+from hrsynth.present.view.scale import CONE_TEXT, LOST, error, round_digits
 
 DESK = Desk()
 CLOSED = 1e-9

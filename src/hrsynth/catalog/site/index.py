@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...characters import name_steering
+from ...present import palette
 from ...version import __version__
 from ..known import alias, order
 from .folder import FOLDERS
@@ -50,7 +51,8 @@ def write(folder: Path, structures: Iterable[Structure]) -> None:
     """Write the index, its data, the scripts and the style; raises ``OSError``."""
     assets = resources.files("hrsynth.catalog.site").joinpath("assets")
     for name in SCRIPTS:
-        (folder / name).write_bytes(assets.joinpath(name).read_bytes())
+        own = palette.css() if name.endswith(".css") else ""
+        (folder / name).write_text(own + assets.joinpath(name).read_text(encoding="utf-8"), encoding="utf-8")
     every = list(structures)
     drawn = [int((folder / FOLDERS[2] / f"{each.name}.svg").exists()) for each in every]
     held = {**columns(every), "drawn": drawn}

@@ -1,1 +1,1 @@
-"""Mechanisms as drawings in SVG: the joint graph, and the kinematic symbols along the legs."""
+"""Mechanisms as drawings in SVG: the kinematic symbols along the legs."""

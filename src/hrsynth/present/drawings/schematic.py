@@ -1,11 +1,9 @@
-"""A mechanism drawn in the manner of the papers, legs as parallel rows from the base to the platform, in two ways.
+"""The kinematic scheme of a mechanism, in the manner of the papers (MMT Table 1, Figs. 2, 4, 13): legs as parallel rows
+from the base to the platform, bent at their knees, with a symbol for each joint.
 
-The *joint graph* has boxes with the letters of joints, lines are links. The *kinematic scheme* has a symbol for each
-joint (MMT Table 1, Figs. 2, 4, 13), its legs are bent at their knees. In both, motors are grey, virtual actuators
-coloured, observed segments thick coloured lines. Equal rods side by side are drawn parallel.
-
-Every joint stands in exactly one element with ``data-joint`` (a planar parallelogram's four in one, a line each), every
-link in one with ``data-link``.
+Motors, virtual actuators and observed segments (thick lines) have the colours of the palette. Equal rods side by side
+are drawn parallel. Every joint stands in exactly one element with ``data-joint`` (a planar parallelogram's four in one,
+a line each), every link in one with ``data-link``.
 """
 
 from __future__ import annotations
@@ -30,54 +28,43 @@ RISE = 22.0
 """Height of a knee (pixels)."""
 STRAIGHT = "PCEF"
 """What does not bend a leg."""
+PITCH, LANE, GAP = 72.0, 52.0, 18.0
+"""Between columns, between lanes, and more between groups (pixels)."""
+LEFT, TOP, RIGHT, BELOW = 62.0, 46.0, 76.0, 14.0
+"""Room about the legs (pixels)."""
 HEAD, BETWEEN = 30.0, 24.0
 """Height of the words above schemes side by side, and the space between these (pixels)."""
 
 
 @dataclass(frozen=True)
 class Scale:
-    """Columns and lanes as pixels: between columns, between lanes, more between groups."""
+    """Columns and lanes as pixels: between columns, between lanes, more between groups. Lanes are bent upwards at the
+    ``knees`` of the group's first chain: for each group (column, rise), from left to right; ``level`` are lanes with
+    sliders beside a group's first chain, which are not bent."""
 
     rows: tuple[Row, ...]
-    pitch: float = 50.0
-    lane: float = 34.0
-    gap: float = 14.0
-    left: float = 62.0
-    top: float = 30.0
+    knees: tuple[tuple[tuple[float, float], ...], ...]
+    level: frozenset[int]
+
+    @classmethod
+    def of(cls, drawn: Layout) -> Scale:
+        """The scale and the knees of a layout."""
+        first = {row.first for row in drawn.rows}
+        level = frozenset(s.lane for s in drawn.spots if s.box.letter in STRAIGHT and s.lane not in first)
+        return cls(drawn.rows, tuple(_knees(drawn, number) for number in range(len(drawn.rows))), level)
 
     def x(self, column: float) -> float:
         """The pixel of a column."""
-        return self.left + self.pitch * column
+        return LEFT + PITCH * column
 
     def y(self, lane: int) -> float:
         """The middle of a lane."""
         before = sum(1 for row in self.rows if row.last < lane)
-        return self.top + self.lane * (lane + 0.5) + self.gap * before
+        return TOP + LANE * (lane + 0.5) + GAP * before
 
     def band(self, row: Row) -> tuple[float, float]:
         """The upper and the lower end of a group."""
-        return self.y(row.first) - self.lane / 2, self.y(row.last) + self.lane / 2
-
-    def at(self, column: float, lane: int) -> svg.Place:
-        """The pixel of a place in a lane."""
-        return self.x(column), self.y(lane)
-
-
-@dataclass(frozen=True)
-class Bends(Scale):
-    """Lanes bent upwards at the knees of the group's first chain: for each group (column, rise), from left to right;
-    ``level`` are lanes with sliders beside a group's first chain, which are not bent."""
-
-    knees: tuple[tuple[tuple[float, float], ...], ...] = ()
-    level: frozenset[int] = frozenset()
-
-    @classmethod
-    def of(cls, drawn: Layout) -> Bends:
-        """The knees of a layout."""
-        first = {row.first for row in drawn.rows}
-        level = frozenset(s.lane for s in drawn.spots if s.box.letter in STRAIGHT and s.lane not in first)
-        knees = tuple(_knees(drawn, number) for number in range(len(drawn.rows)))
-        return cls(drawn.rows, 72.0, 52.0, 18.0, top=46.0, knees=knees, level=level)
+        return self.y(row.first) - LANE / 2, self.y(row.last) + LANE / 2
 
     def at(self, column: float, lane: int) -> svg.Place:
         """The pixel of a place in a lane."""
@@ -102,37 +89,6 @@ def _knees(drawn: Layout, number: int) -> tuple[tuple[float, float], ...]:
     return ((turns[0], 0.0), *zip(inner, rises, strict=True), (turns[-1], 0.0))
 
 
-def graph_svg(
-    mechanism: Mechanism | LegDecomposition,
-    *,
-    observed: Collection[str] | None = None,
-    virtual: Collection[str] = (),
-    title: str | None = None,
-) -> str:
-    """The joint graph of a mechanism, base on the left, platform on the right.
-
-    ``observed`` are names of links (default: those of the mechanism's observations), ``virtual`` names of joints that
-    are drawn as virtual actuators.
-    """
-    drawn = plan(mechanism, observed=observed, virtual=virtual)
-    scale = Scale(drawn.rows)
-    dots = "".join(dot for net in drawn.nets for dot in _dots(net, scale))
-    return _picture(
-        drawn,
-        scale,
-        title or f"Joint graph of {drawn.mechanism.name}",
-        70.0,
-        12,
-        _bands(drawn, scale),
-        [
-            _links(drawn, scale, stroke_width=1.5)
-            + svg.element("path", d=dots, stroke=svg.INK, stroke_width=6, stroke_linecap="round"),
-            *_boxes(drawn, scale),
-            *_ends(drawn, scale, 11, 5, hatched=False),
-        ],
-    )
-
-
 def robot_svg(
     mechanism: Mechanism | LegDecomposition,
     *,
@@ -140,7 +96,11 @@ def robot_svg(
     virtual: Collection[str] = (),
     title: str | None = None,
 ) -> str:
-    """All legs of a mechanism as chains of symbols; arguments as for :func:`graph_svg`."""
+    """All legs of a mechanism as chains of symbols, base on the left, platform on the right.
+
+    ``observed`` are names of links (default: those of the mechanism's observations), ``virtual`` names of joints that
+    are drawn as virtual actuators.
+    """
     drawn = plan(mechanism, observed=observed, virtual=virtual)
     return _scheme(drawn, title or f"Kinematic scheme of {drawn.mechanism.name}")
 
@@ -179,29 +139,19 @@ def derivation_svg(found: Derivation) -> bytes:
 
 
 def _scheme(drawn: Layout, name: str) -> str:
-    bends = Bends.of(drawn)
-    heads = "".join(_head(net, bends) for net in drawn.nets if net.link in drawn.observed)
-    return _picture(
-        drawn,
-        bends,
+    scale = Scale.of(drawn)
+    heads = "".join(_head(net, scale) for net in drawn.nets if net.link in drawn.observed)
+    return svg.picture(
+        scale.x(drawn.columns) + RIGHT,
+        scale.band(drawn.rows[-1])[1] + BELOW,
         name,
-        76,
-        14,
-        _bands(drawn, bends),
-        [
-            *_ends(drawn, bends, 16, 8, hatched=True),
-            _links(drawn, bends, stroke_width=2, stroke_linejoin="round"),
-            svg.element("path", d=heads, fill=svg.VIRTUAL) if heads else "",
-            svg.element("g", *(_symbol(spot, bends) for spot in drawn.spots), stroke=svg.INK, stroke_width=1.6),
-        ],
+        _describe(drawn),
+        *_bands(drawn, scale),
+        *_ends(drawn, scale),
+        _links(drawn, scale),
+        svg.element("path", d=heads, fill=svg.WATCHED) if heads else "",
+        svg.element("g", *(_symbol(spot, scale) for spot in drawn.spots), stroke=svg.INK, stroke_width=1.6),
     )
-
-
-def _picture(
-    drawn: Layout, scale: Scale, name: str, right: float, below: float, bands: list[str], content: list[str]
-) -> str:
-    bottom = scale.band(drawn.rows[-1])[1]
-    return svg.picture(scale.x(drawn.columns) + right, bottom + below, name, _describe(drawn), *bands, *content)
 
 
 def _describe(drawn: Layout) -> str:
@@ -236,11 +186,11 @@ def _bands(drawn: Layout, scale: Scale) -> list[str]:
     return found
 
 
-def _links(drawn: Layout, scale: Scale, **style: object) -> str:
+def _links(drawn: Layout, scale: Scale) -> str:
     plain = [_net(net, scale) for net in drawn.nets if net.link not in drawn.observed]
     seen = [_net(net, scale) for net in drawn.nets if net.link in drawn.observed]
-    return svg.element("g", *plain, fill="none", stroke=svg.INK, **style) + svg.element(
-        "g", *seen, fill="none", stroke=svg.VIRTUAL, stroke_width=4, class_="observed"
+    return svg.element("g", *plain, fill="none", stroke=svg.INK, stroke_width=2, stroke_linejoin="round") + svg.element(
+        "g", *seen, fill="none", stroke=svg.WATCHED, stroke_width=4, class_="observed"
     )
 
 
@@ -252,13 +202,6 @@ def _net(net: Net, scale: Scale) -> str:
     return svg.element("path", svg.title(net.link), d=svg.lines(ways), data_link=net.link)
 
 
-def _dots(net: Net, scale: Scale) -> list[str]:
-    """Where the lines of a link meet its bar."""
-    x = None if net.bar is None else net.bar[0]
-    lanes = sorted({lane for way in net.ways for column, lane in way if column == x})
-    return [f"M{svg.number(scale.x(x))} {svg.number(scale.y(lane))}h0" for lane in lanes if x is not None]
-
-
 def _head(net: Net, scale: Scale) -> str:
     """The arrow on the longest line of an observed segment, towards the platform."""
     pieces = [tuple(sorted((a, b))) for way in net.ways for a, b in pairwise(way)]
@@ -268,50 +211,21 @@ def _head(net: Net, scale: Scale) -> str:
     return arrow(scale.at(*start), scale.at(*end))
 
 
-def _boxes(drawn: Layout, scale: Scale) -> list[str]:
-    found = []
-    for kind, fill, stroke in (
-        ("joint", "#fff", svg.INK),
-        ("motor", svg.MOTOR, svg.INK),
-        ("virtual", svg.VIRTUAL, svg.VIRTUAL),
-    ):
-        boxes = [_box(spot, scale) for spot in drawn.spots if spot.box.kind == kind]
-        if boxes:
-            found.append(svg.element("g", svg.element("g", *boxes, stroke=stroke), fill=fill, class_=kind))
-    return found
-
-
-def _box(spot: PlacedBox, scale: Scale) -> str:
+def _symbol(spot: PlacedBox, scale: Scale) -> str:
     box, (x, y) = spot.box, scale.at(spot.x, spot.lane)
-    said = ", ".join(box.joints) + {"virtual": ": virtual actuator", "motor": ": motor", "joint": ""}[box.kind]
-    return svg.element(
-        "g",
-        svg.title(said),
-        svg.element("rect", x=x - 12, y=y - 11, width=24, height=22, rx=2),
-        svg.words(
-            box.letter,
-            x,
-            y + 5,
-            text_anchor="middle",
-            font_size=14,
-            stroke="none",
-            fill="#fff" if box.virtual else svg.INK,
-            text_decoration="underline" if box.driven else None,
-        ),
-        data_joint="\n".join(box.joints),
-    )
-
-
-def _symbol(spot: PlacedBox, bends: Bends) -> str:
-    box, (x, y) = spot.box, bends.at(spot.x, spot.lane)
-    fill = {"virtual": svg.TINT, "motor": svg.MOTOR, "joint": "#fff"}[box.kind]
     role = {"virtual": ", virtual actuator", "motor": ", driven by a motor", "joint": ""}[box.kind]
     angle = 0.0
     if box.letter in STRAIGHT:
-        (a, b), (c, d) = (bends.at(spot.x + side, spot.lane) for side in (-0.05, 0.05))
+        (a, b), (c, d) = (scale.at(spot.x + side, spot.lane) for side in (-0.05, 0.05))
         angle = math.degrees(math.atan2(d - b, c - a))
     drawing = symbol(
-        box.letter, x, y, angle, fill, f"{WORDS[box.letter]} {', '.join(box.joints)}{role}", "\n".join(box.joints)
+        box.letter,
+        x,
+        y,
+        angle,
+        svg.FILLS[box.kind],
+        f"{WORDS[box.letter]} {', '.join(box.joints)}{role}",
+        "\n".join(box.joints),
     )
     letter = svg.words(
         box.letter,
@@ -319,26 +233,26 @@ def _symbol(spot: PlacedBox, bends: Bends) -> str:
         y - 16,
         text_anchor="middle",
         stroke="none",
-        fill=svg.VIRTUAL if box.virtual else svg.INK,
+        fill=svg.STROKES[box.kind],
         text_decoration="underline" if box.driven else None,
     )
-    return svg.element("g", drawing, letter, class_=box.kind, stroke=svg.VIRTUAL if box.virtual else None)
+    return svg.element("g", drawing, letter, class_=box.kind, stroke=svg.STROKES[box.kind])
 
 
-def _ends(drawn: Layout, scale: Scale, over: float, above: float, *, hatched: bool) -> list[str]:
-    """The base (hatched or not) and the platform links on which legs end as thick bars, with their names."""
+def _ends(drawn: Layout, scale: Scale) -> list[str]:
+    """The base (hatched) and the platform links on which legs end as thick bars, with their names."""
     found = []
     base = drawn.mechanism.base
     for net in drawn.nets:
         if net.bar is None or net.link not in (base, *drawn.platform):
             continue
         (x, upper), (_, lower) = (scale.at(net.bar[0], lane) for lane in net.bar[1:])
-        upper, lower = upper - over, lower + over
-        colour = svg.VIRTUAL if net.link in drawn.observed else svg.INK
+        upper, lower = upper - 16, lower + 16
+        colour = svg.WATCHED if net.link in drawn.observed else svg.INK
         found.append(svg.element("path", d=svg.lines([[(x, upper), (x, lower)]]), stroke=colour, stroke_width=5))
-        if hatched and net.link == base:
+        if net.link == base:
             strokes = [[(x, y), (x - 6, y + 6)] for y in range(int(upper), int(lower), 7)]
             found.append(svg.element("path", d=svg.lines(strokes), stroke=svg.INK, stroke_width=1.2))
         name = "base" if net.link == base else "platform" if len(drawn.platform) == 1 else net.link
-        found.append(svg.words(name, x, upper - above, text_anchor="middle", fill=svg.INK))
+        found.append(svg.words(name, x, upper - 8, text_anchor="middle", fill=svg.INK))
     return found

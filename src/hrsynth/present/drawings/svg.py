@@ -6,15 +6,15 @@ from collections.abc import Iterable
 from xml.sax.saxutils import escape, quoteattr
 
 from ...characters import name_steering
+from ..palette import PAGE, colour, tint
 
-MOTOR = "#bdbdbd"
-"""Fill of what a real motor drives (MMT Table 1)."""
-VIRTUAL = "#b3400a"
-"""Virtual actuators and observed segments; white letters on it have a contrast of 6."""
-TINT = "#fbd5b5"
-"""Inside the symbol of a virtual actuator."""
-INK = "#1a1a1a"
-PALE = "#f1f3f5"
+INK, EMPTY = PAGE["ink"], PAGE["face"]
+MOTOR, VIRTUAL, WATCHED = colour("motor"), colour("actuator"), colour("watched")
+"""What a real motor drives (MMT Table 1), virtual actuators, observed segments."""
+STROKES = {"joint": INK, "motor": MOTOR, "virtual": VIRTUAL}
+FILLS = {"joint": EMPTY, "motor": tint(MOTOR), "virtual": tint(VIRTUAL)}
+"""Line and inside of the symbol of a joint, by its kind."""
+PALE = colour("background")
 """Behind a leg."""
 FONT = "system-ui, 'DejaVu Sans', 'Liberation Sans', Arial, sans-serif"
 

@@ -11,7 +11,7 @@ from ...analysis.derive import Derivation
 from ...mechanism.legs import LegDecomposition
 from ...rewrite.rules import rules
 from ...rewrite.strategy import Step
-from ..drawings.schematic import graph_svg, leg_svg
+from ..drawings.schematic import leg_svg, robot_svg
 
 SOURCES = {rule.name: rule.source for rule in rules()}
 _NAMES = re.compile(
@@ -139,5 +139,5 @@ def _picture(
 ) -> str:
     title = f"{step.rule}: {word}" + (f" (leg {leg})" if leg else "")
     if leg is None:
-        return graph_svg(anatomy, observed=seen, virtual=virtual, title=title)
+        return robot_svg(anatomy, observed=seen, virtual=virtual, title=title)
     return leg_svg(anatomy, leg, observed=seen, virtual=virtual, title=title)

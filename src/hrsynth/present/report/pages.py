@@ -10,9 +10,11 @@ from ...analysis.derive import Derivation
 from ...characters import name_steering
 from ...tolerances import RANK_GAP, SAME_RELATION
 from ...version import __version__
-from ..drawings.schematic import graph_svg
+from ..drawings import svg
+from ..drawings.schematic import robot_svg
 from ..maps import error_map
 from ..modes import picture, why_undrawn
+from ..palette import css
 from ..portrait import Portrait
 from ..text.poses import all_of, at_mode, proof_words
 from ..text.robots import at_zero, exact_words, lost_rows, unseen
@@ -34,14 +36,14 @@ def page(found: Derivation, told: Parts) -> bytes:
     refused is told with its reason."""
     name, modes, errors = found.robot.name, told.modes, told.accuracy
     observed = [o.link for o in found.setting.observed]
-    graphs = [graph_svg(found.setting.anatomy, observed=observed, title=f"Joint graph of the real robot {name}")]
+    graphs = [robot_svg(found.setting.anatomy, observed=observed, title=f"Scheme of the real robot {name}")]
     if found.hidden is not None:
         graphs.append(
-            graph_svg(
+            robot_svg(
                 found.hidden,
                 observed=observed,
                 virtual=actuators(found),
-                title=f"Joint graph of the hidden robot of {name}",
+                title=f"Scheme of the hidden robot of {name}",
             )
         )
     return name_steering(
@@ -101,6 +103,8 @@ def _template() -> Any:
         collected=collect_symbols,
         exact_words=exact_words,
         lost=lost_rows,
+        palette=css(),
+        svg=svg,
         at_zero=at_zero,
         field_rows=field_rows,
         formula=formula,

@@ -21,6 +21,7 @@ from ...budgets import FAREWELL_SECONDS, LARGEST_ASK, MOST_CONNECTIONS, SENDER_S
 from ...errors import BadRequest, FileTooLarge, HrsynthError, MissingExtra
 from ...processes import require_posix
 from ...results import with_spelling
+from .. import palette
 from .guard import HOST, Guard
 from .processes import DESK, ForkServer
 from .tabs import Opening, Tabs
@@ -42,6 +43,8 @@ TYPES = {
 }
 """What is shown of the page's folder."""
 MAIN = "studio.html"
+WRITTEN = {"palette.css": palette.css, "palette.js": palette.js}
+"""Files of the page that are not in its folder."""
 
 
 @with_spelling
@@ -144,9 +147,10 @@ def application(tabs: Tabs) -> Any:
     async def page(request: Request) -> Response:
         name = request.path_params.get("name", MAIN)
         known = {file.name: file for file in PAGE.iterdir() if file.suffix in TYPES and not file.is_symlink()}
-        if name not in known:
+        if name not in known and name not in WRITTEN:
             return Response(status_code=HTTPStatus.NOT_FOUND)
-        return Response(known[name].read_bytes(), media_type=TYPES[known[name].suffix])
+        content = WRITTEN[name]() if name in WRITTEN else known[name].read_bytes()
+        return Response(content, media_type=TYPES[Path(name).suffix])
 
     async def upload(request: Request) -> Response:
         tab, name = tabs.open.get(request.query_params.get("tab", "")), request.query_params.get("name", "")

@@ -25,7 +25,7 @@ from ...kinematics.tasks import Target, solve, system
 from ...mechanism import Mechanism
 from ...results import Value
 from ...tolerances import FOLLOWED, SOLVED
-from ..studio.scale import error
+from .scale import error
 from .shapes import PAGE_DIGITS
 from .sights import ShownSight, shown_sights
 
@@ -82,11 +82,13 @@ class Slider(Value):
 
     def scene(self) -> dict[str, Any]:
         """What the page is given."""
+        values = [round(value, PAGE_DIGITS) for value in self.values]
         return {
             "name": self.name,
+            "label": self.name,
             "unit": self.unit,
-            "values": [round(value, PAGE_DIGITS) for value in self.values],
-            "home": self.home,
+            "values": values,
+            "home": values[self.home],
             "states": [state.scene() for state in self.states],
         }
 

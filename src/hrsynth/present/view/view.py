@@ -22,9 +22,9 @@ from ...options import option
 from ...progress import tell
 from ...results import Result, Value
 from ..outputs import OUTPUTS, function
-from ..studio.scale import scale, unit_of
 from .meshes import meshes
 from .mode_outlines import ModeOutline, mode_outlines
+from .scale import scale, unit_of
 from .shapes import PAGE_DIGITS, RADIUS, Drawer, Shape
 from .sights import eyes, frames
 from .states import HIDDEN, REAL, Mover, Slider, ViewState, page_values, place
@@ -130,7 +130,10 @@ class View(Result, shown_as="view"):
         return {
             **stage(self.setting, self.machines, self.arrows),
             "scale": scale(unit_of(self.setting)),
-            "home": self.home.scene(),
+            "kept": True,
+            "words": "; ".join(f"{machine.key} {machine.words}" for machine in self.machines),
+            "legs": [{"name": arrow.leg, "watched": True} for arrow in self.arrows],
+            "state": self.home.scene(),
             "sliders": [slider.scene() for slider in self.sliders],
             "ghosts": [outline.scene() for outline in self.mode_outlines],
             "notes": list(self.notes),

@@ -2,8 +2,8 @@
 
 const SPACE = "http://www.w3.org/2000/svg";
 const SIZE = 320;
-const STROKES = { base: ["#7a828b", 2], leg: ["#4a4f55", 3], platform: ["#1f4e8c", 3.4], seen: ["#b3400a", 4.6] };
-const FILLS = { base: "#eceff2", platform: "#c9dcf2" };
+const STROKES = { base: ["var(--edge)", 2], leg: ["var(--soft)", 3], platform: ["var(--ink)", 3.4], seen: ["var(--watched)", 4.6] };
+const FILLS = { base: "var(--ground)", platform: "var(--line)" };
 const stage = document.getElementById("stage");
 
 /** A robot in space that is drawn again whenever it is turned. */
@@ -25,7 +25,10 @@ function turning() {
 
   function shape(name, settings) {
     const made = document.createElementNS(SPACE, name);
-    for (const [key, own] of Object.entries(settings)) made.setAttribute(key, own);
+    for (const [key, own] of Object.entries(settings)) {
+      if (["stroke", "fill"].includes(key)) made.style.setProperty(key, own);
+      else made.setAttribute(key, own);
+    }
     return made;
   }
 
@@ -33,19 +36,19 @@ function turning() {
   function drawn([kind, role, , joint], points) {
     const d = `M${points.map((point) => `${point[0].toFixed(1)} ${point[1].toFixed(1)}`).join("L")}`;
     const driven = motors === null ? role === "motor" : motors.has(joint);
-    const fill = driven ? "#1a1a1a" : "#fff";
+    const fill = driven ? "var(--motor)" : "var(--face)";
     const line = (stroke, width) => shape("path", { d, stroke, "stroke-width": width, fill: "none" });
     if (kind === "area") {
       const [stroke, width] = STROKES[role] ?? STROKES.leg;
-      return [shape("path", { d: `${d}Z`, stroke, "stroke-width": width, fill: FILLS[role] ?? "#fff", "fill-opacity": 0.75 })];
+      return [shape("path", { d: `${d}Z`, stroke, "stroke-width": width, fill: FILLS[role] ?? "var(--face)", "fill-opacity": 0.75 })];
     }
     if (kind === "line") {
       const [stroke, width] = STROKES[role] ?? STROKES.leg;
-      return [line("#fff", width + 3), line(stroke, width)];
+      return [line("var(--face)", width + 3), line(stroke, width)];
     }
-    if (kind === "sleeve") return [line("#1a1a1a", 13), line(fill, 10)];
+    if (kind === "sleeve") return [line("var(--ink)", 13), line(fill, 10)];
     const [[cx, cy]] = points;
-    return [shape("circle", { cx, cy, r: driven ? 5.5 : 3.6, fill, stroke: "#1a1a1a", "stroke-width": 1.4 })];
+    return [shape("circle", { cx, cy, r: driven ? 5.5 : 3.6, fill, stroke: "var(--ink)", "stroke-width": 1.4 })];
   }
 
   function draw() {

@@ -16,9 +16,9 @@ from ....errors import HrsynthError
 from ....tolerances import SAME_RELATION
 from ...text.poses import all_of
 from ...text.tables import name_all
+from ...view.scale import LOST, error
 from ..commands import lines
 from ..request import Request
-from ..scale import LOST, error
 from .watch import smallest
 
 

@@ -11,9 +11,9 @@ from ....geometry.so3 import rotation_of
 from ....geometry.vectors import pose
 from ....kinematics.limits import outside
 from ....tolerances import SLIDER_ARRIVED
+from ...view.scale import error, nothing, unit_of
 from ...view.states import BEYOND_SLIDERS, Mover, Posed
 from ..request import Request
-from ..scale import error, nothing, unit_of
 
 PLACE = 7
 """Numbers of a place: position and unit quaternion."""

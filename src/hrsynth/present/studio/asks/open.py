@@ -13,12 +13,12 @@ from ....errors import HrsynthError, NoSegment
 from ....mechanism.legs import Leg
 from ....mechanism.sensors import default_observation, reason
 from ...view.meshes import meshes
+from ...view.scale import scale, unit_of
 from ...view.shapes import PAGE_DIGITS
 from ...view.states import REAL, Mover, Posed
 from ...view.view import arrows_of, machine_of, stage
 from ..commands import lines
 from ..request import Request
-from ..scale import scale, unit_of
 from .move import describe_pose
 
 MOST_OFFERED = 30

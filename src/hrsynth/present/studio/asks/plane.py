@@ -25,10 +25,10 @@ from ....mechanism.pose import SCALARS, Grid, Pose
 from ....results import Value
 from ....tolerances import ON_LOCUS, SAME_RELATION, SLIDER_ARRIVED
 from ...text.tables import NOT_BOUNDED, is_bounded
+from ...view.scale import CONE, CONE_TEXT, SIGNS, STEPS, round_digits, unit_of
 from ...view.states import Mover
 from ..commands import NONE, digits, lines, same_at
 from ..request import Request
-from ..scale import CONE, CONE_TEXT, SIGNS, STEPS, round_digits, unit_of
 
 ACCURACY, DISTANCE = "accuracy", "distance"
 DISTANCES = (0.01, 0.03, 0.1, 0.3)

@@ -25,11 +25,11 @@ from ....mechanism.observations.direction import Direction
 from ....tolerances import NAMED
 from ...text.poses import STATES
 from ...text.robots import at_zero, certificate, exact_words
+from ...view.scale import CONE, error, nothing, unit_of
 from ...view.states import HIDDEN
 from ...view.view import machine_of
 from ..commands import lines
 from ..request import Request
-from ..scale import CONE, error, nothing, unit_of
 
 MOST_SETS = 10
 """Smallest sets that are listed."""

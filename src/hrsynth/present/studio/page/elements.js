@@ -55,22 +55,22 @@ function written(value, unit) {
   return words.replace(/^-(?=0\.0+[^0-9])/, "");
 }
 
-/* A slider with its label and what it stands at; `read` sets it without a call of `onmove`. */
+/* A slider with its label and what it stands at, one of `values` if there are any; `read` sets it without a call of `onmove`. */
 class Slider {
-  constructor({ label, unit, min, max, value, steps = 200 }, onmove, onset = () => {}) {
-    this.unit = unit;
+  constructor({ label, unit, min, max, value, steps = 200, values }, onmove, onset = () => {}) {
+    Object.assign(this, { unit, values });
     const id = fresh("slider");
     this.input = element("input", { type: "range", id });
-    Object.assign(this.input, { min, max, step: unit ? (max - min) / steps || 1e-6 : 1 });
+    Object.assign(this.input, values ? { max: values.length - 1 } : { min, max, step: unit ? (max - min) / steps || 1e-6 : 1 });
     this.output = element("output", { for: id });
     this.root = element("div", { className: "slider" }, element("label", { for: id, textContent: label }), this.output, this.input);
-    this.input.oninput = () => { this.told(Number(this.input.value)); onmove(this.value); };
+    this.input.oninput = () => { const at = Number(this.input.value); this.told(values ? values[at] : at); onmove(this.value); };
     this.input.onchange = () => onset(this.value);
     this.read(value);
   }
 
   read(value) {
-    this.input.value = value;
+    this.input.value = this.values ? this.values.indexOf(value) : value;
     this.told(value);
   }
 

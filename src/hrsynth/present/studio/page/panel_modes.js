@@ -15,7 +15,10 @@ class ModesPanel extends Panel {
     this.outlines = [];
   }
 
-  opened() { this.anew(); }
+  opened({ kept }) {
+    this.find.hidden = this.kept = Boolean(kept);
+    this.anew();
+  }
 
   rewatched() { this.anew(); }
 
@@ -28,7 +31,7 @@ class ModesPanel extends Panel {
   settled() {
     const away = (values) => values?.some((value, i) => Math.abs(value - this.studio.values[i]) > 1e-6);
     if (this.flown) this.flown.to ??= this.studio.values;
-    if (this.flown ? away(this.flown.to) : away(this.origin)) this.words.textContent = "These belong to an earlier pose. Find them again.";
+    if (this.flown ? away(this.flown.to) : away(this.origin)) this.words.textContent = this.kept ? "These belong to the pose at home." : "These belong to an earlier pose. Find them again.";
   }
 
   forget() {
@@ -49,7 +52,7 @@ class ModesPanel extends Panel {
     if (!found) return;
     this.forget();
     Object.assign(this, { origin, start, outlines: found.modes });
-    this.join.hidden = found.modes.length < 2;
+    this.join.hidden = this.kept || found.modes.length < 2;
     this.words.textContent = found.words;
     this.list.replaceChildren(...found.modes.map((mode) => this.row(mode)));
     this.same.show(found);

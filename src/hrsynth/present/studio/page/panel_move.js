@@ -6,8 +6,9 @@ class MovePanel extends Panel {
     super(studio, "move", "Move");
     this.sliders = [];
     this.list = element("div", { className: "sliders" });
+    this.notes = element("ul", { className: "notes" });
     this.drag = tick("Drag the platform in the picture", false, (on) => this.grip(on));
-    this.body.append(this.list, element("div", { className: "row" }, button("Home", () => this.home()), this.drag));
+    this.body.append(this.list, element("div", { className: "row" }, button("Home", () => this.home()), this.drag), this.notes);
   }
 
   opened(scene) {
@@ -18,6 +19,8 @@ class MovePanel extends Panel {
       return slider;
     });
     this.drag.querySelector("input").checked = false;
+    this.drag.hidden = Boolean(scene.kept);
+    this.notes.replaceChildren(...(this.studio.tabs ? [] : scene.notes).map((textContent) => element("li", { textContent })));
     this.grip(false);
     this.status.clear();
     this.same.show(scene);

@@ -69,7 +69,7 @@ return class Stage {
       return arrow;
     }));
     this.canvas.setAttribute("aria-label", `Picture of ${record.name ?? "the robot"}; arrow keys turn it, plus and minus move closer and away, Home shows all.`);
-    if (record.home ?? record.state) this.state(record.home ?? record.state);
+    if (record.state) this.state(record.state);
     this.sight.look(record.normal);
     this.layout(this.mode);
     this.fit();
@@ -111,7 +111,7 @@ return class Stage {
     group.userData.there = Boolean(place);
   }
 
-  /* "overlay" (the hidden robot within the real one, which is pale), "beside", "real", "hidden" or "none". */
+  /* "overlay" (the hidden robot within the real one, which is pale), "beside", "real" or "hidden". */
   layout(mode) {
     const fresh = mode !== this.mode;
     this.mode = mode;
@@ -125,20 +125,14 @@ return class Stage {
   arrange() {
     const { real, hidden } = this.machines, both = Boolean(hidden?.places);
     if (!real) return;
-    this.mix = both || this.mode === "none" ? this.mode : "real";
-    real.group.visible = !["hidden", "none"].includes(this.mix);
-    if (hidden) hidden.group.visible = both && !["real", "none"].includes(this.mix);
+    this.mix = both ? this.mode : "real";
+    real.group.visible = this.mix !== "hidden";
+    if (hidden) hidden.group.visible = both && this.mix !== "real";
     real.pale(this.mix === "overlay" ? hidden : null);
     this.parts.ghosts.children.forEach((each) => { each.visible = !this.isHere(each.userData.places); });
     for (const { group, side } of this.arrows)
-      group.visible = this.arrowed !== false && group.userData.there && (side === "real" || this.mix === "beside");
+      group.visible = group.userData.there && (side === "real" || this.mix === "beside");
     this.dirty();
-  }
-
-  /* Whether the arrows of the directions are drawn at all. */
-  directions(on) {
-    this.arrowed = on;
-    this.arrange();
   }
 
   /* Two robots beside each other, or above where the pane is high, with their names. */

@@ -8,7 +8,8 @@ class Studio {
     this.reduced = matchMedia("(prefers-reduced-motion: reduce)").matches;
     this.stage = new Stage($("pane"), { reduced: this.reduced, over: [$("tools"), $("now")] });
     this.stage.onpick = (kind, name) => { if (kind === "leg") this.panels.legs?.toggle(name); };
-    this.link = new Link({ onstart: (said) => this.begin(said), onback: () => this.back(), onlost: (refused) => this.lost(refused) });
+    const kept = $("kept"), to = { onstart: (said) => this.begin(said), onback: () => this.back(), onlost: (refused) => this.lost(refused) };
+    this.link = kept ? new Kept(JSON.parse(kept.textContent), to) : new Link(to);
     this.pending = 0;
     this.tools();
     $("legend").open = !matchMedia("(max-width: 760px)").matches;
@@ -16,7 +17,7 @@ class Studio {
   }
 
   begin({ start, panels, watch, camera, hidden }) {
-    const kinds = panels ? [RobotPanel, MovePanel, LegsPanel, ModesPanel, PlanePanel, ServoPanel, ExportPanel] : [MovePanel, ModesPanel];
+    const kinds = panels ? [RobotPanel, MovePanel, LegsPanel, ModesPanel, PlanePanel, ServoPanel, ExportPanel] : [MovePanel, ModesPanel, SightsPanel];
     const made = kinds.map((Kind) => new Kind(this));
     this.panels = Object.fromEntries(made.map((panel) => [panel.key, panel]));
     document.body.classList.toggle("plain", !panels);
@@ -77,7 +78,7 @@ class Studio {
     document.title = `${scene.name} – hrsynth studio`;
     this.stage.scene(scene);
     this.stage.watch(this.watch);
-    this.hasHidden(false);
+    this.hasHidden(scene.machines.length > 1);
     this.draw((this.state = scene.state));
     this.each("opened", scene);
     this.stage.fit();
@@ -86,6 +87,7 @@ class Studio {
     this.answer();
     this.link.ask("move", this.asked(), "first").catch(() => {});  /* the process that moves it reads the robot now */
     if (hidden) this.reveal();
+    else if (scene.machines.length > 1) this.overlay();
   }
 
   /* The hidden robot over the real one, where no panel asks for it. */
@@ -93,6 +95,10 @@ class Studio {
     const found = await this.panels.move.ask("watch", "Deriving the hidden robot");
     if (!found?.hidden) return;
     this.rehide(found.hidden);
+    this.overlay();
+  }
+
+  overlay() {
     this.layouts.querySelector("input[value=overlay]").checked = true;
     this.arrange("overlay");
   }
@@ -181,7 +187,8 @@ class Studio {
   draw(state) {
     this.stage.state(state);
     const beyond = state.beyond?.length ? `beyond its limits: ${state.beyond.join(", ")}` : "";
-    $("now").textContent = [state.error?.words, beyond].filter(Boolean).join("; ");
+    const away = this.tabs || state.distance === null ? "" : `smallest singular value of Mᵀ ${state.distance?.toPrecision(3)}`;
+    $("now").textContent = [state.error?.words, away, beyond].filter(Boolean).join("; ");
     $("now").hidden = !$("now").textContent;
     if (this.step !== state.error?.step) this.relegend();
     this.step = state.error?.step;

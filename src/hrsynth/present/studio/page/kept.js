@@ -1,0 +1,27 @@
+"use strict";
+/* What a page that was saved has in place of the connection: it answers from the configurations that it holds, in which
+   one coordinate of the platform is away from home. Where it stands is told as which value of which slider, null at home. */
+
+class Kept {
+  constructor(record, { onstart }) {
+    this.record = record;
+    this.values = record.sliders.map(({ home }) => home);
+    queueMicrotask(() => onstart({ start: { source: "kept" }, panels: false, watch: null, camera: null, hidden: false }));
+  }
+
+  async ask(kind, fields) { return this[kind](typeof fields === "function" ? fields() : fields); }
+
+  cancel() {}
+
+  open() { return this.record; }
+
+  modes() { return { modes: this.record.ghosts, words: "" }; }
+
+  /* The slider that was moved goes on alone: all others go home. */
+  move({ values, here }) {
+    const { sliders, state } = this.record, moved = values ? values.findIndex((value, i) => value !== this.values[i]) : -1;
+    const at = moved < 0 ? here : { slider: moved, value: sliders[moved].values.indexOf(values[moved]) };
+    this.values = sliders.map((slider, i) => at?.slider === i ? slider.values[at.value] : slider.home);
+    return { state: at ? sliders[at.slider].states[at.value] : state, here: at, values: this.values, stopped: false };
+  }
+}
