@@ -29,6 +29,13 @@ def test_the_version_is_one_in_package_changelog_and_citation():
     assert f"\nversion: {version}\ndate-released: {date}\n" in citation
 
 
+def test_what_is_not_released_fits_on_a_page():
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    lines = re.search(r"^## \[Unreleased\]\n.*?(?=\n## \[)", changes, re.MULTILINE | re.DOTALL)[0].splitlines()
+    assert len(lines) <= 60
+    assert [line for line in lines if len(line) > 120] == []
+
+
 def test_the_licence_is_that_of_all_that_is_shipped():
     """The expression names the licence of the bundled three.js, whose text is the one in the bundle."""
     assert PROJECT["license"] == "BSD-3-Clause AND MIT"
