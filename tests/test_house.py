@@ -97,7 +97,7 @@ NOT_IN_FILES = [
 TYPE_CHECKING = "from typing import TYPE_CHECKING"
 
 MODULES = sorted(PACKAGE.rglob("*.py"))
-TESTS = sorted((ROOT / "tests").rglob("test_*.py"))
+TESTS = sorted(path for folder in ("tests", "studies") for path in (ROOT / folder).rglob("test_*.py"))
 
 
 def tree_of(path: Path) -> ast.Module:

@@ -11,7 +11,6 @@ import threading
 import time
 from collections import deque
 from datetime import timedelta
-from types import TracebackType
 from typing import Self
 
 from ..characters import escape_steering
@@ -25,8 +24,6 @@ OFTEN, AGAIN = 0.1, 1.0
 """Seconds between two writings on a terminal, at least while something is told, and at most."""
 BAR = 40
 """Columns of a bar."""
-CLEAR = "\x1b[K"
-"""What clears the rest of a terminal's line."""
 
 
 class Progress:
@@ -51,14 +48,12 @@ class Progress:
             self._timer.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         with self._lock:
             self._start = float("inf")
             if self._written is not None:
                 self._write()
-                self._put(CLEAR)
+                self._put("")
         self._timer.cancel()
 
     def tell(self, what: str) -> None:
@@ -100,13 +95,13 @@ class Progress:
 
     def _write(self) -> None:
         self._written = time.monotonic()
-        self._put(self._line(self._written)[: shutil.get_terminal_size().columns - 1] + CLEAR)
+        self._put(self._line(self._written)[: shutil.get_terminal_size().columns - 1])
 
     @staticmethod
     def _put(text: str) -> None:
-        """Write from the line's beginning, and go back to it: what anybody else writes takes the line's place."""
+        """Write from the line's beginning, clear the rest, and go back: what anybody else writes takes its place."""
         with contextlib.suppress(OSError, ValueError):
-            print(f"\r{text}", end="\r", file=sys.stderr, flush=True)
+            print(f"\r{text}\x1b[K", end="\r", file=sys.stderr, flush=True)
 
     def _line(self, now: float) -> str:
         if not self._total:
