@@ -14,7 +14,6 @@ import subprocess
 import sys
 import tarfile
 import tempfile
-import tomllib
 import venv
 import zipfile
 from collections.abc import Iterator
@@ -42,6 +41,10 @@ NEEDED = (
     "studies/parroblib/README.md",
 )
 """What a source archive must hold, of each kind of file something."""
+ADDRESSES = ("pyproject.toml", "SECURITY.md")
+"""Files with addresses of the project."""
+RESERVED = re.compile(r"\bhrsynth\.example\b")
+"""A name that RFC 2606 keeps free."""
 PACKAGED = ("hrsynth/robots/quattro.urdf", "hrsynth/catalog/shipped/mixed.jsonl.gz")
 """What a wheel must hold besides all files of the package itself: where its links lead."""
 
@@ -106,15 +109,20 @@ def numbers(version: str) -> tuple[int, ...]:
     return tuple(map(int, version.split(".")))
 
 
+def placeholders() -> list[str]:
+    """Where an address is still the reserved one, and the line: what whoever publishes fills in."""
+    return [
+        f"{name}:{number}: {line.strip()}"
+        for name in ADDRESSES
+        for number, line in enumerate((ROOT / name).read_text(encoding="utf-8").splitlines(), 1)
+        if RESERVED.search(line)
+    ]
+
+
 def require_addresses() -> None:
-    """Raise ``Refused`` while the project's addresses are the reserved ones."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    told = [*project["urls"].values(), *(author.get("email", "") for author in project["authors"])]
-    if any(re.search(r"\.example(/|$)", each) for each in told):
-        raise Refused(
-            "pyproject.toml: write the project's own addresses in authors and [project.urls], "
-            "hrsynth.example is nobody's"
-        )
+    """Raise ``Refused`` while some of the project's addresses are the reserved ones."""
+    if left := placeholders():
+        raise Refused("\n  ".join(["write the project's own addresses in place of these, which are nobody's:", *left]))
 
 
 def build(source: Path, target: Path) -> tuple[Path, Path]:

@@ -21,7 +21,6 @@ from hrsynth.cli import app, execute
 from hrsynth.cli.completion import candidates
 from hrsynth.cli.questions import QUESTIONS
 from hrsynth.description import shipped
-from hrsynth.errors import MissingExtra
 from hrsynth.options import OUTPUT, READING, WATCHING
 
 ROOT: Any = app
@@ -256,10 +255,7 @@ def test_completion_knows_robots_and_every_option():
 
 
 def test_completion_knows_the_examples_once_they_are_begun():
-    try:
-        known = [f"example:{name}" for name in hrsynth.examples()]
-    except MissingExtra:
-        pytest.skip("example-robot-data is not installed")
+    known = [f"example:{name}" for name in hrsynth.examples()]
     assert candidates(ROOT, ["derive", "exa"]) == candidates(ROOT, ["verify", "c.json", "--robot", "example:"]) == known
     assert candidates(ROOT, ["derive", "example:cassie"])[0].startswith("example:cassie")
 

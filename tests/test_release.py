@@ -29,6 +29,13 @@ def test_the_version_is_one_in_package_changelog_and_citation():
     assert f"\nversion: {version}\ndate-released: {date}\n" in citation
 
 
+def test_what_is_not_released_fits_on_a_page():
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    lines = re.search(r"^## \[Unreleased\]\n.*?(?=\n## \[)", changes, re.MULTILINE | re.DOTALL)[0].splitlines()
+    assert len(lines) <= 60
+    assert [line for line in lines if len(line) > 120] == []
+
+
 def test_the_licence_is_that_of_all_that_is_shipped():
     """The expression names the licence of the bundled three.js, whose text is the one in the bundle."""
     assert PROJECT["license"] == "BSD-3-Clause AND MIT"
@@ -64,7 +71,7 @@ def test_every_extra_that_is_named_is_there_and_all_holds_them():
         for path in (ROOT / "src").rglob("*.py")
         for extra in re.findall(r'MissingExtra\([^()]*?"([a-z]+)"\)', path.read_text(encoding="utf-8"))
     }
-    assert {"plots", "solve", "bench", "examples"} <= named
+    assert {"plots", "solve", "bench", "usd"} <= named
     assert named <= extras.keys()
     (whole,) = extras["all"]
     assert set(re.search(r"\[(.*)\]", whole)[1].split(",")) == extras.keys() - {"all"}
@@ -152,6 +159,17 @@ def test_the_long_description_has_no_link_that_needs_the_repository():
     assert PROJECT["authors"][0]["email"]
 
 
+def test_reserved_addresses_stand_only_where_a_publisher_writes_their_own():
+    assert {each.partition(":")[0] for each in release.placeholders()} == {*release.ADDRESSES}
+    others = [
+        path
+        for folder in ("src", "docs", "robots", "catalog", "notebooks", "studies", "benchmarks", "requirements")
+        for path in (ROOT / folder).rglob("*")
+        if path.is_file() and path.suffix in (".py", ".md", ".toml", ".js", ".html", ".j2", ".urdf", ".txt")
+    ] + [path for path in ROOT.iterdir() if path.is_file() and path.name not in (*release.ADDRESSES, "CHANGELOG.md")]
+    assert [path for path in others if release.RESERVED.search(path.read_text(encoding="utf-8", errors="ignore"))] == []
+
+
 @pytest.fixture
 def checkout(tmp_path, monkeypatch):
     """A clone of the repository as it is, with addresses of its own, for the script to work on."""
@@ -168,8 +186,9 @@ def checkout(tmp_path, monkeypatch):
             target.symlink_to(source.readlink())
         elif source.is_file():
             target.write_bytes(source.read_bytes())
-    told = (copy / "pyproject.toml").read_text(encoding="utf-8").replace("hrsynth.example", "robots.test")
-    (copy / "pyproject.toml").write_text(told, encoding="utf-8")
+    for name in release.ADDRESSES:
+        told = (copy / name).read_text(encoding="utf-8").replace("hrsynth.example", "robots.test")
+        (copy / name).write_text(told, encoding="utf-8")
     log = copy / "CHANGELOG.md"
     if "- " not in log.read_text(encoding="utf-8").split("## [")[1]:
         log.write_text(
@@ -226,7 +245,7 @@ def test_a_release_is_refused_with_the_reason(checkout):
     told = (checkout / "pyproject.toml").read_text(encoding="utf-8").replace("robots.test", "hrsynth.example")
     (checkout / "pyproject.toml").write_text(told, encoding="utf-8")
     release.git("commit", "--quiet", "--all", "--message", "addresses")
-    with pytest.raises(Refused, match="addresses"):
+    with pytest.raises(Refused, match=r"addresses(?s:.*)pyproject\.toml:\d+: Homepage"):
         release.main("99.0.0")
     log = checkout / "CHANGELOG.md"
     log.write_text(

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import io
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from description.samples import every_joint, with_rods
+from hrsynth.analysis.derive import derive
 from hrsynth.description import load, native, shipped, spanning
+from hrsynth.errors import BadRequest
 from hrsynth.mechanism.model import JointType, Mechanism
 
 ROBOTS = (
@@ -61,3 +64,21 @@ def test_urdf_parser_py_loads_the_tree(robot: Mechanism):
     for joint in robot.joints.values():
         if joint.in_tree:
             assert loaded.get_chain(robot.base, joint.successor)[-1] == joint.successor
+
+
+def test_an_object_of_yourdfpy_is_read_as_the_file_that_it_writes(tmp_path: Path):
+    yourdfpy = pytest.importorskip("yourdfpy")
+    tree = yourdfpy.URDF.load(str(shipped()["rrrrr_m1"]), load_meshes=False)
+    tree.write_xml_file(str(tmp_path / "tree.urdf"))
+    said = {
+        "close": "dist_1:dist_2@-0.16896249413879,0.10701250195374,0:revolute",
+        "motors": "shoulder_1,shoulder_2",
+        "platform": "dist_1",
+    }
+    found = load(tree, **said)
+    assert found == load(tmp_path / "tree.urdf", **said)
+    assert derive(found).hidden_architecture == derive(load("rrrrr_m1")).hidden_architecture
+    assert (found.file, found.sha256) == (str(shipped()["rrrrr_m1"]), None)
+    for other in (5, None, tree.robot):
+        with pytest.raises(BadRequest, match=r"allowed: a path, .*, a yourdfpy\.URDF$"):
+            load(other)

@@ -79,6 +79,23 @@ def test_mesh_files_beside_the_robot_are_read(tmp_path: Path, address: str):
     assert (rods(found, "prox_1"), rods(found, "prox_2")) == (0, 1)
 
 
+def test_meshes_of_an_object_of_yourdfpy_are_read_where_it_looks_for_them(tmp_path: Path):
+    import trimesh
+    import yourdfpy
+
+    trimesh.creation.box(extents=SIZE).export(tmp_path / "part.stl")
+    file = tmp_path / "arm.urdf"
+    file.write_text(
+        f'<robot name="arm"><link name="base"/><link name="hand">{mesh("part.stl", "2 2 2")}</link>'
+        '<link name="arm"/><joint name="elbow" type="continuous"><parent link="base"/><child link="arm"/>'
+        '<axis xyz="0 0 1"/></joint><joint name="hinge" type="continuous"><parent link="arm"/><child link="hand"/>'
+        '<axis xyz="0 0 1"/><origin xyz="1 0 0"/></joint></robot>'
+    )
+    found = view(load(yourdfpy.URDF.load(str(file)), platform="hand", motors="elbow,hinge"))
+    (points,) = meshed(found, "hand")
+    assert np.ptp(points, axis=0) == pytest.approx(2 * SIZE, rel=1e-5)
+
+
 @pytest.mark.some(0, 1)
 @pytest.mark.parametrize(
     "ending", [".xml", pytest.param(".sdf", marks=pytest.mark.slow), pytest.param(".usda", marks=pytest.mark.slow)]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
 from typing import Any
 
 from ..options import NEEDED, Option
@@ -70,10 +69,8 @@ def _words(option: Option, last: str) -> Iterable[str]:
     words = option.words() if callable(option.words) else option.words
     if option.words is shipped_names and last and EXAMPLE.startswith(last[: len(EXAMPLE)]):
         from ..description import examples
-        from ..errors import MissingExtra
 
-        with suppress(MissingExtra):
-            return [*words, *(f"{EXAMPLE}{name}" for name in examples())]
+        return [*words, *(f"{EXAMPLE}{name}" for name in examples())]
     return words
 
 

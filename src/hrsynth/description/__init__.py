@@ -5,9 +5,12 @@ from __future__ import annotations
 import contextlib
 import difflib
 import os
+import tempfile
 from collections.abc import Iterable
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..errors import BadRequest, GuessedPlatform, warn_caller
 from ..mechanism.model import Mechanism, Note
@@ -22,7 +25,13 @@ from .overrides import Overrides
 from .reading import read
 from .tree import spanning
 
+if TYPE_CHECKING:
+    from yourdfpy import URDF
+
 __all__ = ["examples", "load", "native", "save", "shipped", "spanning", "targets"]
+
+NAMED = "a path, the name of a shipped robot, example:NAME"
+"""How a robot's file is given."""
 
 
 def shipped() -> dict[str, Path]:
@@ -38,7 +47,7 @@ def shipped() -> dict[str, Path]:
 
 @with_spelling
 def load(
-    robot: str | Path | Mechanism,
+    robot: str | Path | Mechanism | URDF,
     *,
     base: str | None = None,
     platform: str | None = None,
@@ -52,7 +61,8 @@ def load(
     as_written: bool = False,
 ) -> Mechanism:
     """The mechanism of a robot file in any dialect, of a shipped robot given by its name, or of one from the package
-    example-robot-data (``example:cassie``); a mechanism is returned unchanged.
+    example-robot-data (``example:cassie``), or of a ``yourdfpy.URDF``, read as the file that it writes (a tree, whose
+    closures are given); a mechanism is returned unchanged.
 
     Where the platform is guessed, ``GuessedPlatform`` (a ``UserWarning`` of ``hrsynth.errors``) is warned of.
 
@@ -101,7 +111,7 @@ def load(
                 "the file of a robot, or its name",
             )
         return robot
-    found = read(file_of(robot), overrides)
+    found = read(file_of(robot), overrides) if isinstance(robot, str | os.PathLike) else _of_urdf(robot, overrides)
     if found.choice is not None and found.choice.chosen == "guess":
         warn_caller(
             f"{found.name}: the platform is link {found.platform!r}, {found.choice} "
@@ -111,10 +121,25 @@ def load(
     return found
 
 
-def file_of(robot: str | Path) -> Path:
+def _of_urdf(robot: URDF, overrides: Overrides) -> Mechanism:
+    """The mechanism of an object of yourdfpy; its meshes lie where that looks for them. Raises ``BadRequest`` for
+    another object."""
+    from yourdfpy import URDF
+
+    if not isinstance(robot, URDF):
+        raise BadRequest("a robot's file", robot, f"{NAMED}, a yourdfpy.URDF")
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "robot.urdf"
+        robot.write_xml_file(str(file))
+        found = read(file, overrides)
+    looked_in = getattr(getattr(robot, "_filename_handler", None), "keywords", {}).get("dir")
+    return replace(found, file=str(Path(looked_in) / f"{found.name}.urdf") if looked_in else None, sha256=None)
+
+
+def file_of(robot: str | os.PathLike[str]) -> Path:
     """The file that a name or a path stands for; raises ``BadRequest`` for a name of no robot."""
     if not isinstance(robot, str | os.PathLike) or robot == "":
-        raise BadRequest("a robot's file", robot, "a path, the name of a shipped robot, example:NAME")
+        raise BadRequest("a robot's file", robot, NAMED)
     path = Path(robot)
     if isinstance(robot, str) and robot.startswith(PREFIX) and not os.path.exists(robot):
         return _file_by_name(

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
-from ..errors import MissingExtra
-
 PREFIX = "example:"
 PACKAGE = "example-robot-data"
 FOLDER = f"cmeel.prefix/share/{PACKAGE}/robots"
@@ -15,16 +13,11 @@ FOLDER = f"cmeel.prefix/share/{PACKAGE}/robots"
 def examples() -> dict[str, Path]:
     """Name to file, sorted by name: the file's, with the folder's before it where several files have one name.
 
-    Raises ``MissingExtra`` where the package is not installed.
-
     >>> robots = hrsynth.examples()
     """
-    from importlib.metadata import PackageNotFoundError, distribution
+    from importlib.metadata import distribution
 
-    try:
-        folder = Path(str(distribution(PACKAGE).locate_file(FOLDER)))
-    except PackageNotFoundError:
-        raise MissingExtra("the examples of " + PACKAGE, "examples") from None
+    folder = Path(str(distribution(PACKAGE).locate_file(FOLDER)))
     files = [path for ending in ("urdf", "sdf") for path in folder.glob(f"*/*/*.{ending}")]
     count = Counter(path.stem for path in files)
     named = {

@@ -125,7 +125,7 @@ def rows_of(case: Case, measured: object, at: object) -> np.ndarray | None:
                 robot,
                 [
                     (link, measured.at, True),  # type: ignore[attr-defined]
-                    (link, measured.axis, False),
+                    (link, measured.axis, False),  # type: ignore[attr-defined]
                 ],
             ),
             frames,

@@ -160,7 +160,7 @@ class BranchProof(Result, shown_as="branch"):
     passive: Annotated[tuple[str, ...], ""]
     held: Annotated[tuple[str, ...], ""]
     parts: Annotated[tuple[BranchPart, ...], ""]
-    back: Annotated[tuple[Array, Array] | None, Table | None, f"{BACK}; null without a proof"]
+    back: Annotated[tuple[Array, Array] | None, Table | None, f"{BACK}, or null"]
     """A box of all motors (m, rad), low and high (n,) each, about the zero configuration, in which no two are proved to
     give the platform one pose; None where there is no proof."""
     regular: Annotated[bool, "whether the proved box has no Type 1 singularity (proved)"]

@@ -104,7 +104,7 @@ class Basins(Result, shown_as="basins"):
     target: ClosedConfiguration
     grid: Grid
     ends: Annotated[tuple[BasinEnd, ...], ""]
-    cells: Annotated[Places, Table, "numbers of ``ends``, counted from 0, -1 where the robot cannot start"]
+    cells: Annotated[Places, Table, "numbers of ``ends``, counted from 0, -1 where no run starts"]
     damped: Flags
     abreast: Annotated[bool, ""]
     followed: Annotated[int, ""] = 0

@@ -57,7 +57,7 @@ class RestPoint(Record):
     shift: Annotated[float, Number, As("radius_m")] = np.inf
     turn: Annotated[float, Number, As("radius_rad")] = np.inf
     decided: Annotated[bool, ""] = False
-    rates: Annotated[tuple[tuple[float, float], ...], "they enclose those of the linearised loop, times −1 / gain"] = ()
+    rates: Annotated[tuple[tuple[float, float], ...], "intervals of those of the linearised loop, times −1 / gain"] = ()
     side: Annotated[str | None, Literal["goal", "other"] | None, "of the Type 2 locus"] = None
     reversed: Annotated[tuple[str, ...], ""] = ()
     across: Annotated[tuple[str, ...], ""] = ()
