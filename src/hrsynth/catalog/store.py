@@ -180,6 +180,11 @@ class Database(Store):
         question = RecordQuestion.of({**asked, "group": tuple(groups)})
         with _refusing_sqlite_errors(self.path):
             file = self._open()
+            counted = (
+                "(SELECT count(*) FROM records), (SELECT max(record) FROM records), (SELECT max(record) FROM lines)"
+            )
+            if len(set(file.execute(f"SELECT {counted}").fetchone())) > 1:
+                raise BadRequest(f"{self.path}: not a catalog file: its records and its lines differ in number")
             return StoredLines(self.path, file, question.rows(file))
 
     def count(self, group: str) -> int:
