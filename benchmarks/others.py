@@ -46,7 +46,7 @@ AROUND = 0.1
 """How far these are from the zero configuration (rad, m)."""
 GROWTH = (500, 1600, 5000)
 """Words of the catalog that are made in one build."""
-LIMIT = 0.05
+LIMIT = 0.3
 """Within which a SQLite file answers (s)."""
 EXACT, WHOLE, CORES = 12, 3, 2
 """Words of each group of the catalog of which the exact verdict is made on each core, and the whole entry; cores."""
@@ -235,7 +235,7 @@ def questions(file: Path) -> Row:
     from catalog.stub import QUESTIONS
 
     kept = store.shipped_folder()
-    store._write_tables(file, {group: kept.lines([group], {}) for group in kept.groups()})
+    store.write_tables(file, {group: kept.lines([group], {}) for group in kept.groups()})
 
     def told(path: Path | None, asked: dict[str, Any]) -> str:
         return entries(load_catalog(path, **asked).records, count(path, **asked))

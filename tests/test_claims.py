@@ -7,9 +7,11 @@ import re
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from hrsynth.cli.schema import commands, schema
 from hrsynth.index import analyses
 from tables import claims
 from tables.claims import CERTAIN, CLAIMS, NO_CLAIMS
@@ -26,6 +28,7 @@ def texts() -> tuple[tuple[str, str], ...]:
     for file in sorted(PACKAGE.rglob("*.py")):
         found += [(f"{file.relative_to(ROOT)}:{line}", text) for line, text in strings(file.read_text("utf-8"))]
     found += [(f"hrsynth {name} -h", each["help"]) for name, each in analyses().items()]
+    found += [(f"hrsynth schema {name}", words) for name in commands() for words in descriptions(schema(name))]
     for ending in ("html", "j2", "js"):
         for file in sorted(PACKAGE.rglob(f"*.{ending}")):
             if not file.name.endswith(".min.js"):  # a library of others
@@ -34,6 +37,15 @@ def texts() -> tuple[tuple[str, str], ...]:
                     for number, line in enumerate(visible(file.read_text("utf-8")).splitlines(), 1)
                 ]
     return tuple((where, text) for where, text in found if CERTAIN.search(text))
+
+
+def descriptions(part: Any) -> Iterator[str]:
+    """What a schema says of its fields."""
+    for name, each in part.items() if isinstance(part, dict) else ():
+        if name == "description" and isinstance(each, str):
+            yield each
+        else:
+            yield from descriptions(each)
 
 
 def strings(source: str) -> Iterator[tuple[int, str]]:

@@ -36,6 +36,8 @@ HELPERS = {
 @cache
 def analyses() -> dict[str, dict[str, Any]]:
     """What is declared of each analysis, by its name, in the order of lists."""
+    if not PACKAGE.is_dir():  # in an archive, which the command line refuses
+        return {}
     found: dict[str, dict[str, Any]] = json.loads(INDEX.read_text(encoding="utf-8"))
     return found
 

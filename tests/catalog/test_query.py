@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hrsynth.catalog.fits import FIELDS, TEXTS, fits, may_fit
+from hrsynth.catalog.fits import FIELDS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -21,10 +21,12 @@ import hrsynth
 from catalog.stub import CHAINS, QUESTIONS, REFUSED, VERDICTS, WORKERS, entry, source, without_checksum
 from hrsynth.catalog import Catalog, load
 from hrsynth.catalog.build import build, check
+from hrsynth.catalog.conditions import FIELDS, places
 from hrsynth.catalog.jsonl import COUNTS, FLAGS, LISTS, Record, line, record, word_of
 from hrsynth.catalog.jsonl import TEXTS as TEXT_FIELDS
-from hrsynth.catalog.query import count, groups_of, values
-from hrsynth.catalog.store import Database, Folder, _write_tables, shipped_folder
+from hrsynth.catalog.known import is_called
+from hrsynth.catalog.query import values
+from hrsynth.catalog.store import Database, Folder, shipped_folder, write_tables
 from hrsynth.catalog.words import SENSORS, VERSION
 from hrsynth.cli import execute
 from hrsynth.errors import BadRequest
@@ -123,10 +125,17 @@ ANY_FIELD = st.fixed_dictionaries(
 @pytest.mark.slow
 def test_lines_are_left_unread_only_where_they_do_not_fit(asked: dict[str, Any]):
     """Whatever is asked for, and however the file was written."""
-    told, hold = may_fit(asked), fits(asked)
-    for text, spaced, read in _every_line():
-        assert told(text) or not hold(read)
-        assert told(spaced)
+    lines, spaced, records = zip(*_every_line(), strict=True)
+    found = list(places(lines, asked, record))
+    assert found == list(places(spaced, asked, record))
+    if isinstance(text := asked.get("text"), str):
+        held = [
+            i
+            for i, each in enumerate(records)
+            if is_called(each, text) or any(text.casefold() in str(value).casefold() for value in each.values())
+        ]
+        others = places(lines, asked | {"text": None}, record)
+        assert found == [i for i in others if i in set(held)]
 
 
 @pytest.mark.some(0, 3)
@@ -150,43 +159,29 @@ def test_sqlite_holds_the_same_records(stores: tuple[Path, Path]):
     assert sorted(file.name for file in big.parent.iterdir()) == ["big.sqlite", "lines"]
 
 
-OLD_COLUMNS = ("group", "dof", "motion", "verdict", "base_motors", "fewest")
-
-
-def older(layout: str, every: Folder, path: Path) -> Path:
-    """A file as older versions wrote it: lines beside columns, or in a table of their own, by the numbers of rows."""
-    kept, rows = ("", "") if layout == "apart" else (", line", " WITHOUT ROWID" if layout == "without rowid" else "")
-    with contextlib.closing(sqlite3.connect(path)) as file:
-        file.execute("CREATE TABLE versions (format INTEGER, catalog INTEGER)")
-        file.execute("INSERT INTO versions VALUES (1, 1)")
-        file.execute(
-            f'CREATE TABLE records ("group", word, {", ".join(OLD_COLUMNS[1:])}{kept}, '
-            f'PRIMARY KEY ("group", word)){rows}'
-        )
-        if layout == "apart":
-            file.execute("CREATE TABLE lines (record INTEGER PRIMARY KEY, line TEXT)")
-        for group in every.groups():
-            for text in every.lines([group], {}):
-                found = record(text)
-                row = (group, found["word"], *(found.get(name) for name in OLD_COLUMNS[1:]), *([text] if kept else []))
-                number = file.execute(f"INSERT INTO records VALUES ({', '.join('?' * len(row))})", row).lastrowid
-                if layout == "apart":
-                    file.execute("INSERT INTO lines VALUES (?, ?)", (number, text))
-        file.commit()
-    return path
-
-
-@pytest.mark.parametrize("asked", [{"legs": "?-R*"}, {"text": "two lines"}, {"modes": 6}, {"dof": 3, "legs": 4}])
-@pytest.mark.parametrize("layout", ["beside", "without rowid", "apart"])
-def test_sqlite_files_of_older_versions_are_read(
-    asked: dict[str, Any], layout: str, stores: tuple[Path, Path], tmp_path: Path
-):
-    file = older(layout, Folder(stores[0]), tmp_path / "older.sqlite")
-    assert list(load(file, **asked)) == list(load(stores[0], **asked))
-    assert 0 < len(load(file, **asked)) < 100
-    assert count(file) == 100
-    assert groups_of(file) == ["c", "d"]
-    assert values("dof", file) == load(stores[0]).values("dof")
+@pytest.mark.parametrize("has", ["lines beside columns", "lines apart", "columns as arrays"])
+def test_sqlite_files_of_older_versions_are_refused(has: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    """In one line, which says what to do."""
+    file = tmp_path / "older.sqlite"
+    with contextlib.closing(sqlite3.connect(file)) as older:
+        older.execute("CREATE TABLE versions (format INTEGER, catalog INTEGER)")
+        older.execute("INSERT INTO versions VALUES (1, 1)")
+        match has:
+            case "lines beside columns":
+                older.execute('CREATE TABLE records ("group", word, dof, line, PRIMARY KEY ("group", word))')
+            case "lines apart":
+                older.execute('CREATE TABLE records ("group", word, dof, PRIMARY KEY ("group", word))')
+                older.execute("CREATE TABLE lines (record INTEGER PRIMARY KEY, line TEXT)")
+            case _:
+                older.execute("CREATE TABLE groups (name TEXT PRIMARY KEY, count INTEGER) WITHOUT ROWID")
+                older.execute("CREATE TABLE lines (record INTEGER PRIMARY KEY, line TEXT)")
+                older.execute("CREATE TABLE columns (name TEXT PRIMARY KEY, letters BLOB)")
+        older.commit()
+    for arguments in (["list"], ["list", "--dof", "3"], ["show", "Delta"], ["build", "planar", "--check"]):
+        where = "-o" if "build" in arguments else "--catalog"
+        assert execute(["catalog", *arguments, where, str(file)]) == (3 if "build" in arguments else 2)
+        (said,) = capsys.readouterr().err.splitlines()
+        assert "another version, found 'format 1, words 1', allowed: format 2, words 1; build it again" in said
 
 
 @pytest.mark.parametrize("name", FIELDS)
@@ -196,41 +191,33 @@ def test_values_of_a_field_are_those_of_all_records(name: str, stores: tuple[Pat
     assert values(name, big) or name == "see"
 
 
-READ_BY: dict[str, dict[str, Any]] = {
-    **{name: {name: "none"} for name in FIELDS},
-    "legs": {"legs": 3},
-    "modes_bound": {"modes": 3},
-    "see": {"see": "point"},
-    **{name: {"text": ""} for name in TEXTS if name != "steps"},
-    "folded word": {"text": "nowhere"},
-    **{name: {"legs": "?x*"} for name in ("notation as written", "chain", "word", "bare word")},
-}
-"""A question for which each column is read; no record here has steps."""
-
-
 @pytest.mark.parametrize(
     "change",
     [
-        "letters = substr(letters, 2)",
-        "ends = substr(ends, 1 + ends_width)",
-        "numbers = x'ffffffff'",
-        "letters_width = 3",
-        "name = 'other'",
+        "DROP TABLE lines",
+        "DROP TABLE texts",
+        "DROP TABLE chains",
+        "ALTER TABLE records RENAME COLUMN dof TO freedoms",
+        "DELETE FROM lines",
+        "UPDATE lines SET line = x'00'",
+        "UPDATE lines SET line = 'no record'",
+        """UPDATE records SET "group" = 3 WHERE "group" = 'd'""",
     ],
 )
-def test_a_file_whose_columns_are_spoilt_is_told(change: str, stores: tuple[Path, Path], tmp_path: Path):
+def test_a_file_whose_tables_are_spoilt_is_told(change: str, stores: tuple[Path, Path], tmp_path: Path, capsys):
     file = tmp_path / "spoilt.sqlite"
-    with contextlib.closing(sqlite3.connect(stores[1])) as whole:
-        assert {name for (name,) in whole.execute("SELECT name FROM columns")} == {"steps", *READ_BY}
-    for name, asked in READ_BY.items():
-        Database(stores[1]).lines(["c", "d"], asked)
-        file.write_bytes(stores[1].read_bytes())
-        with contextlib.closing(sqlite3.connect(file)) as opened:
-            opened.execute(f"UPDATE columns SET {change} WHERE name = ?", (name,))
-            opened.commit()
-        if not (change.startswith("numbers") and name.endswith("word")):  # words have none
-            with pytest.raises(BadRequest, match="no file of the catalog: "):
-                Database(file).lines(["c", "d"], asked)
+    file.write_bytes(stores[1].read_bytes())
+    with contextlib.closing(sqlite3.connect(file)) as opened:
+        opened.execute(change)
+        opened.commit()
+    said = set()
+    for asked in ([], ["--dof", "3"], ["--text", "lines"], ["--legs", "?-R*"]):
+        status = execute(["catalog", "list", *asked, "--catalog", str(file)])
+        errors = capsys.readouterr().err
+        assert len(errors.splitlines()) == (status == 2)
+        assert "spoilt.sqlite: not a " in errors or status == 0
+        said.add(status)
+    assert 2 in said
 
 
 ODD = [
@@ -390,13 +377,12 @@ def test_sqlite_answers_as_the_lines_do(every: int, tmp_path: Path):
     kept, folder, file = shipped_folder(), Folder(tmp_path / "lines"), tmp_path / "all.sqlite"
     folder.path.mkdir()
     groups = {group: kept.lines([group], {})[::every] for group in kept.groups()}
-    _write_tables(file, groups)
+    write_tables(file, groups)
     for group, some in groups.items():
         folder.write(group, some)
     lines = {word_of(line): line for some in groups.values() for line in some}
     names = [group for group in kept.groups() if group != SENSORS]
     for asked in (*QUESTIONS, {"text": "lift 1"}):
-        assert Database(file).decides(asked)
         found = Database(file).lines(names if asked.get("see") is None else [SENSORS], asked)
         words = load(folder.path, **asked).words
         assert list(found) == [lines[word] for word in words], asked
@@ -460,7 +446,7 @@ def test_what_cannot_be_asked_or_read_is_refused(stores: tuple[Path, Path], tmp_
     with sqlite3.connect(newer) as file:
         file.execute("UPDATE versions SET format = 7")
     for refuse in (load, lambda path: build(path, source=source())):
-        with pytest.raises(BadRequest, match="another version, found 'format 7, words 1', allowed: format 1, words 1"):
+        with pytest.raises(BadRequest, match="another version, found 'format 7, words 1', allowed: format 2, words 1"):
             refuse(newer)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from ..budgets import LARGEST_RECORD
 from ..errors import BadRequest
-from .jsonl import Record, is_written, leading_word, record
+from .jsonl import LINE_START, Record, is_written, leading_word, record
 from .known import kinds, kinds_called, known_as
 from .words import LONGEST_COUNT, MOVED, count_equal, sights
 
@@ -43,14 +43,14 @@ COLUMNS: Mapping[str, str] = {
 """The columns of the table of records, and how each comes from a record's line. ``drives``: the kinds of driven joints;
 ``parallelograms``: whether a leg has one, or two equal parallel rods; ``said``: the number of its text in the table of
 texts."""
-BETWEEN = b"\xff"
-"""Between texts: no text that is asked for has it."""
+BETWEEN = "\uffff"
+"""Between texts: no letter, so no text that is asked for has it."""
 LONGEST_PATTERN = 50_000
 """Bytes of a pattern, above which SQLite takes none."""
 
 
 @dataclass(frozen=True)
-class Condition:
+class RecordCondition:
     """What is asked for by one name."""
 
     where: str
@@ -80,26 +80,30 @@ def _pattern(text: str) -> str | None:
     return None if found is None or "\0" in found or len(found.encode()) > LONGEST_PATTERN else found
 
 
-CONDITIONS: Mapping[str, Condition] = {
-    "group": Condition('+"group" = {0}', _same),
-    "dof": Condition("dof = {0}", _same),
-    "motion": Condition("motion = {0}", _same),
-    "verdict": Condition("verdict = {0}", _same),
-    "base_motors": Condition("base_motors = {0}", _same),
-    "driven": Condition("driven = {0}", _same),
-    "motors": Condition("drives = {0}", _letters),
-    "parallelograms": Condition("parallelograms = {0}", _same),
-    "fewest": Condition("fewest = {0}", _same),
-    "see": Condition("see = {0}", lambda text: _same(count_equal(sights(text)))),
-    "modes": Condition("modes_bound = {0}", _same),
-    "legs": Condition("legs = {0}", lambda number: _same(int(number))),
-    "text": Condition(
-        "(said IN (SELECT said FROM texts WHERE instr(text, {0})) OR instr(lower(word), {0}))",
-        lambda text: _folded(text),
+def _folded(text: str) -> bytes | None:
+    """A text as it is sought."""
+    return None if BETWEEN in text else text.casefold().encode("utf-8", "surrogatepass")
+
+
+CONDITIONS: Mapping[str, RecordCondition] = {
+    "group": RecordCondition('+"group" = {0}', _same),
+    "dof": RecordCondition("dof = {0}", _same),
+    "motion": RecordCondition("motion = {0}", _same),
+    "verdict": RecordCondition("verdict = {0}", _same),
+    "base_motors": RecordCondition("base_motors = {0}", _same),
+    "driven": RecordCondition("driven = {0}", _same),
+    "motors": RecordCondition("drives = {0}", _letters),
+    "parallelograms": RecordCondition("parallelograms = {0}", _same),
+    "fewest": RecordCondition("fewest = {0}", _same),
+    "see": RecordCondition("see = {0}", lambda text: _same(count_equal(sights(text)))),
+    "modes": RecordCondition("modes_bound = {0}", _same),
+    "legs": RecordCondition("legs = {0}", lambda number: _same(int(number))),
+    "text": RecordCondition(
+        "(said IN (SELECT said FROM texts WHERE instr(text, {0})) OR instr(lower(word), {0}))", _folded
     ),
 }
 """What can be asked for."""
-LEG_PATTERN = Condition(
+LEG_PATTERN = RecordCondition(
     """(word GLOB {0} OR replace(word, '*', '') GLOB {0}
         OR notation IN (SELECT notation FROM chains WHERE chain GLOB {0}))""",
     _pattern,
@@ -115,14 +119,14 @@ def require_askable(asked: Mapping[str, Any]) -> None:
 
 
 @dataclass(frozen=True)
-class Question:
+class RecordQuestion:
     """All that is asked for and not None, as SQL with its values."""
 
     where: str
     values: Sequence[Any]
 
     @classmethod
-    def of(cls, asked: Mapping[str, Any]) -> Question:
+    def of(cls, asked: Mapping[str, Any]) -> RecordQuestion:
         """Of several values in a tuple or list one has to be met. Raises ``BadRequest`` for a value that none can
         have."""
         clauses, values = list[str](), list[Any]()
@@ -146,7 +150,7 @@ class Question:
         return [row for (row,) in file.execute(asked, self.values)]
 
 
-def _condition(name: str, value: Any) -> tuple[Condition, Any]:
+def _condition(name: str, value: Any) -> tuple[RecordCondition, Any]:
     """That of one value, and the value as it is told."""
     of_texts = name in ("legs", "see", "text", "motors")
     if of_texts and not isinstance(value, str) and (name, type(value)) != ("legs", int):
@@ -198,36 +202,36 @@ def fill(
 
 
 def places(lines: Sequence[str], asked: Mapping[str, Any], read: Callable[[str], Record]) -> Sequence[int]:
-    """Where among lines those of records are that fit. Not all are read; raises what ``read`` raises for those that
-    are no records, where that is seen without reading."""
-    question = Question.of(asked)
-    rest: Sequence[int] = range(len(lines))
-    if not question.where:
-        return rest
+    """Where among lines those of records are that fit: one condition after the other, each of what the ones before
+    left. Records are read for texts alone, of lines that may hold them; raises what ``read`` raises for lines that are
+    no records, where that is seen."""
+    questions = {name: RecordQuestion.of({name: asked[name]}) for name in CONDITIONS if asked.get(name) is not None}
+    left: Sequence[int] = range(len(lines))
+    for name, question in questions.items():
+        if name == "text":
+            left = [i for i in left if any(_may_hold(lines[i], each) for each in question.values)]
+        left = [left[i] for i in _fitting([lines[i] for i in left], question, read)]
+    return left
+
+
+def _fitting(lines: Sequence[str], question: RecordQuestion, read: Callable[[str], Record]) -> Sequence[int]:
     for line in lines:
-        if not is_written(line):
+        if not line.startswith(LINE_START):
             read(line)
-    if isinstance(text := asked.get("text"), str):
-        rest = [i for i in rest if _may_hold(lines[i], text.casefold())]
     try:
         with closing(sqlite3.connect(":memory:")) as memory:
             memory.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_RECORD)
-            fill(memory, [lines[i] for i in rest], question.columns(), read)
-            return [rest[row - 1] for row in question.rows(memory)]
+            fill(memory, lines, question.columns(), read)
+            return [row - 1 for row in question.rows(memory)]
     except sqlite3.Error as error:
-        raise BadRequest("records of the catalog that cannot be searched", str(error)) from None
-
-
-def _folded(text: str) -> bytes:
-    """A text as it is sought."""
-    return text.casefold().encode("utf-8", "surrogatepass")
+        raise BadRequest("records of the catalog that no question reads", str(error)) from None
 
 
 def _said(found: Record) -> bytes:
     """All texts of a record, with the names under which its robot is known; a word is sought apart, but for one with
     letters of which SQLite knows no small ones."""
-    values = [value for name, value in found.items() if name != "word" or not value.isascii()]
-    return BETWEEN.join(_folded(str(each)) for each in (*values, known_as(found)))
+    values = [str(value) for name, value in found.items() if name != "word" or not value.isascii()]
+    return BETWEEN.join([*values, known_as(found)]).casefold().encode("utf-8", "surrogatepass")
 
 
 def driven_kinds(word: str, choices: str | None, dof: int) -> str:
@@ -250,9 +254,10 @@ def chains(notation: str | None) -> str:
     return json.dumps(sorted({name for each in found if each for name in (each, each.replace("*", ""))}))
 
 
-def _may_hold(line: str, text: str) -> bool:
-    """Whether the record of a line may hold a casefolded text, or be known by it, without reading it: where the line
-    is as a build writes it, and the text would stand in it letter by letter."""
+def _may_hold(line: str, sought: bytes | None) -> bool:
+    """Whether the record of a line may hold a text, or be known by it, without reading it: where the line is as a build
+    writes it, and the text would stand in it letter by letter."""
+    text = (sought or b"").decode("utf-8", "surrogatepass")
     return (
         text in line.casefold()
         or not re.fullmatch(r"[a-z0-9*+!.{|}()-]+( +[a-z0-9*+!.{|}()-]+)*", text)

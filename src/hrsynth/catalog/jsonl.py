@@ -16,7 +16,7 @@ Record = Mapping[str, Any]
 
 CHECKSUM = "crc32"
 """What the head of a file that is not packed calls the checksum of all lines behind it."""
-_LINE_START, _GROUP = '{"word":"', '","group":"'
+LINE_START, _GROUP = '{"word":"', '","group":"'
 
 FORMAT = 1
 """Version of the lines and the journal."""
@@ -165,13 +165,13 @@ def word_of(text: str, file: str | None = None) -> str:
 
 def is_written(text: str) -> bool:
     """Whether a line is as :func:`line` writes it, and what it says stands in it letter by letter."""
-    return text.startswith(_LINE_START) and _GROUP in text and '": ' not in text and "\\u" not in text
+    return text.startswith(LINE_START) and _GROUP in text and '": ' not in text and "\\u" not in text
 
 
 def leading_word(text: str, file: str | None = None) -> str:
     """The word with which a line begins that :func:`line` wrote, else that of its record."""
-    end = text.find('"', len(_LINE_START)) if text.startswith(_LINE_START) else -1
-    return text[len(_LINE_START) : end] if end > 0 else word_of(text, file)
+    end = text.find('"', len(LINE_START)) if text.startswith(LINE_START) else -1
+    return text[len(LINE_START) : end] if end > 0 else word_of(text, file)
 
 
 def encode_lines(group: str, lines: Iterable[str], *, checksum: bool = True) -> bytes:

@@ -18,7 +18,7 @@ from ..budgets import LARGEST_CATALOG, LARGEST_RECORD, MOST_RECORDS
 from ..description.files import open_regular, replacement
 from ..errors import BadRequest, BuildStopped
 from ..untrusted import gunzip
-from .conditions import Question, fill, places
+from .conditions import RecordQuestion, fill, places
 from .journal import ENDING, Journal
 from .jsonl import FLAGS, decode_lines, encode_lines, head_count, leading_word, record, require_version
 from .words import VERSION
@@ -100,9 +100,7 @@ class Folder(Store):
 
     def content(self, group: str) -> bytes:
         """The bytes of a group's lines; raises ``BadRequest`` where they cannot be read."""
-        file = self.file(group)
-        with _readable(file), open_regular(file) as stream:
-            content = stream.read(LARGEST_CATALOG + 1)
+        file, content = self._bytes(group, LARGEST_CATALOG + 1)
         if len(content) > LARGEST_CATALOG:
             raise BadRequest(f"{file}: file too large", None, f"up to {LARGEST_CATALOG} bytes, or a SQLite file")
         if not file.name.endswith(PACKED):
@@ -112,8 +110,17 @@ class Folder(Store):
             raise BadRequest(f"{file}: lines", count, f"up to {MOST_RECORDS}, or a file that is not compressed")
         return content
 
+    def _bytes(self, group: str, most: int) -> tuple[Path, bytes]:
+        """A group's file, and so many of its bytes at most."""
+        file = self.file(group)
+        with _readable(file), open_regular(file) as stream:
+            return file, stream.read(most)
+
     def count(self, group: str) -> int:
-        return head_count(self.content(group).partition(b"\n")[0], str(self.file(group)))
+        file, content = self._bytes(group, LARGEST_RECORD)
+        if file.name.endswith(PACKED):
+            content = gunzip(content, file, LARGEST_RECORD, whole=False)
+        return head_count(content.partition(b"\n")[0], str(file))
 
     def values(self, name: str) -> list[Any]:
         records = (record(line, str(self.path)) for line in self.lines(self.groups(), {}))
@@ -170,9 +177,14 @@ class Database(Store):
         return found
 
     def lines(self, groups: Sequence[str], asked: Mapping[str, Any]) -> Sequence[str]:
-        question = Question.of({**asked, "group": tuple(groups)})
+        question = RecordQuestion.of({**asked, "group": tuple(groups)})
         with _refusing_sqlite_errors(self.path):
             file = self._open()
+            counted = (
+                "(SELECT count(*) FROM records), (SELECT max(record) FROM records), (SELECT max(record) FROM lines)"
+            )
+            if len(set(file.execute(f"SELECT {counted}").fetchone())) > 1:
+                raise BadRequest(f"{self.path}: not a catalog file: its records and its lines differ in number")
             return StoredLines(self.path, file, question.rows(file))
 
     def count(self, group: str) -> int:

@@ -101,7 +101,7 @@ class Progress:
     def _put(text: str) -> None:
         """Write from the line's beginning, clear the rest, and go back: what anybody else writes takes its place."""
         with contextlib.suppress(OSError, ValueError):
-            print(f"\r{text}\x1b[K", end="\r", file=sys.stderr, flush=True)
+            rewrite_line(text)
 
     def _line(self, now: float) -> str:
         if not self._total:
