@@ -41,11 +41,10 @@ def texts() -> tuple[tuple[str, str], ...]:
 
 def descriptions(part: Any) -> Iterator[str]:
     """What a schema says of its fields."""
-    for name, each in part.items() if isinstance(part, dict) else ():
-        if name == "description" and isinstance(each, str):
-            yield each
-        else:
-            yield from descriptions(each)
+    for each in part.get("properties", {}).values():
+        yield from [each["description"]] if "description" in each else []
+    for each in part.get("$defs", {}).values():
+        yield from descriptions(each)
 
 
 def strings(source: str) -> Iterator[tuple[int, str]]:

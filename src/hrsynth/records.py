@@ -13,6 +13,7 @@ Named tuples and typed dictionaries, whose members are all told, stand for what 
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -251,7 +252,7 @@ def schema(kind: Any, parts: dict[str, Any]) -> dict[str, Any]:
         return schema(told_type(kind), parts)
     if kind.__name__ not in parts:
         parts[kind.__name__] = {}
-        parts[kind.__name__] = {"description": " ".join((kind.__doc__ or "").split()), **object_schema([kind], parts)}
+        parts[kind.__name__] = {"description": summary(kind), **object_schema([kind], parts)}
     return {"$ref": f"#/$defs/{kind.__name__}"}
 
 
@@ -271,6 +272,11 @@ def object_schema(kinds: Sequence[Any], parts: dict[str, Any]) -> dict[str, Any]
             properties |= {name: each for name, each in inner["properties"].items() if name not in member.how.without}
             required |= set() if NoneType in get_args(member.kind) else {*inner["required"]} - {*member.how.without}
     return {"type": "object", "properties": properties, "required": sorted(required), "additionalProperties": False}
+
+
+def summary(kind: type) -> str:
+    """What a class says of itself first, before it comes to its fields."""
+    return re.split(r"\.(?:\s|$)|[;:,] ``", " ".join((kind.__doc__ or "").split()), maxsplit=1)[0] + "."
 
 
 def told_type(kind: Any) -> Any:

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hrsynth.catalog.fits import FIELDS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

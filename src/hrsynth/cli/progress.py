@@ -14,7 +14,7 @@ from datetime import timedelta
 from typing import Self
 
 from ..characters import escape_steering
-from .colour import say
+from .colour import rewrite_line, say
 
 SPEED_OVER = 600.0
 """Seconds over which the speed of a build is averaged: words differ much."""

@@ -13,7 +13,7 @@ import hrsynth
 from .. import records
 from ..options import NEEDED, Option
 from ..present.outputs import OUTPUTS, File, function
-from ..records import Head, OfRobot, object_schema
+from ..records import Head, OfRobot, object_schema, summary
 from .app import app
 from .colour import say
 from .commands import DeclaredCommand, Group, add_command
@@ -42,7 +42,7 @@ def schema(command: str) -> dict[str, Any]:
     fields |= {file.record: _answer(function(file.computed)) | None for file in files if file.record and file.computed}
     head["properties"] |= {name: records.schema(each, parts) for name, each in fields.items()}
     head["required"] = sorted([*head["required"], *fields])
-    told = {"title": f"hrsynth {command} --json", "description": " ".join((kind.__doc__ or "").split())}
+    told = {"title": f"hrsynth {command} --json", "description": summary(kind)}
     return {"$schema": DIALECT, **told, **head, "$defs": parts}
 
 
