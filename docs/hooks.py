@@ -208,8 +208,10 @@ def folded(parts: list[str]) -> str:
 
 def public() -> str:
     """What ``import hrsynth`` offers, in the order of its table of names."""
+    from hrsynth.index import homes
+
     head = "# Public functions\n\n`import hrsynth` offers these names; each is imported when it is first used."
-    return "\n\n".join([head, *(f"::: hrsynth{module}.{name}" for name, module in homes().items())])
+    return "\n\n".join([head, *(f"::: hrsynth.{module}.{name}" for name, module in homes().items())])
 
 
 def records() -> str:
@@ -221,6 +223,8 @@ def records() -> str:
 
 def modules(folder: str) -> str:
     """Every module of a folder of the package: first what a user calls, then the modules, those first that hold it."""
+    from hrsynth.index import homes
+
     names = [
         ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts)
         for path in (PACKAGE / folder).rglob("*.py")
@@ -228,8 +232,8 @@ def modules(folder: str) -> str:
     ]
     called: dict[str, list[str]] = {}
     for name, module in homes().items():
-        if (module.lstrip(".") + ".").startswith(f"{folder}."):
-            called.setdefault(f"hrsynth{module}", []).append(name)
+        if f"{module}.".startswith(f"{folder}."):
+            called.setdefault(f"hrsynth.{module}", []).append(name)
     order = sorted(names, key=lambda name: (name not in called, name))
     lines = [
         f"- [`hrsynth.{name}`](index.md#{module}.{name}): {first_line(module, name)}"
@@ -238,17 +242,6 @@ def modules(folder: str) -> str:
     ]
     head = "\n".join([f"# {folder}", "", *(["What `import hrsynth` offers of it:", "", *lines, ""] if lines else [])])
     return head + "\n\n" + "\n\n".join(f"::: {name}\n    options:\n      heading_level: 2" for name in order)
-
-
-@cache
-def homes() -> dict[str, str]:
-    """The module of each public name."""
-    tree = ast.parse((PACKAGE / "__init__.py").read_text(encoding="utf-8"))
-    table = next(
-        node.value for node in tree.body if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "_HOME"
-    )
-    found: dict[str, str] = ast.literal_eval(table)
-    return found
 
 
 def first_line(module: str, name: str) -> str:

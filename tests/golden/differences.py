@@ -22,6 +22,22 @@ def masked(text: str) -> list[str]:
     return [" ".join(NUMBER.sub("#", line).replace("─", "-").split()) for line in text.splitlines()]
 
 
+def inlined(schema: Json, parts: Json, inside: tuple[str, ...] = ()) -> Json:
+    """A schema with its parts in their places, without what is said of them; of what holds itself the name."""
+    if isinstance(schema, list):
+        return [inlined(each, parts, inside) for each in schema]
+    if not isinstance(schema, dict):
+        return schema
+    name = str(schema.get("$ref", "")).rpartition("/")[2]
+    if name:
+        return name if name in inside else inlined(parts[name], parts, (*inside, name))
+    return {
+        key: inlined(each, parts, inside)
+        for key, each in schema.items()
+        if key not in ("$defs", "$schema", "title") and not (key == "description" and isinstance(each, str))
+    }
+
+
 def renamed(value: Json, names: dict[str, str]) -> Json:
     """The same with other names of fields: those that were changed on purpose."""
     if isinstance(value, dict):

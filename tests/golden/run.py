@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from golden.answers import Case, asked, cases
-from golden.differences import GREY, differences, of_pictures, renamed
+from golden.differences import GREY, differences, inlined, of_pictures, renamed
 
 KEPT = Path(__file__).parent / "answers.jsonl.gz"
 NAMES = Path(__file__).parent / "renamed.toml"
@@ -37,6 +37,9 @@ def answers(chosen: Iterable[Case], workers: int) -> Iterator[tuple[str, Any]]:
 def changes(old: Any, new: Any, names: dict[str, str]) -> list[str]:
     """What differs in two answers to one case."""
     old = renamed(old, names)
+    for each in (old, new):
+        if isinstance(each.get("json"), dict) and "$defs" in each["json"]:
+            each["json"] = inlined(each["json"], each["json"]["$defs"])
     before, after = old.pop("pixels", None), new.pop("pixels", None)
     found = list(differences(old, new))
     if (before is None) != (after is None):
