@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from hrsynth.analysis.verdict import BLIND, CONTROLLABLE, PARTIAL
 from hrsynth.catalog.query import Catalog, load
 from hrsynth.catalog.store import shipped_folder
@@ -18,10 +20,10 @@ def table(catalog: Catalog | None = None) -> str:
     """The Markdown table of how many architectures of each group have which verdict (default: of what is shipped)."""
     if catalog is None:
         catalog = Catalog((*load(), *load(group=SENSORS))) if shipped_folder().groups() else Catalog(())
-    rows = [_row(str(group), catalog.where(group=group)) for (group,) in catalog.count("group")]
-    return markdown(HEADS, [*rows, _row("all", catalog)], 1)
+    counts, total = catalog.count("group", "verdict"), catalog.count("verdict")
+    rows = [_row(name, [counts.get((name, verdict), 0) for verdict in VERDICTS]) for name in catalog.values("group")]
+    return markdown(HEADS, [*rows, _row("all", [total.get((verdict,), 0) for verdict in VERDICTS])], 1)
 
 
-def _row(name: str, catalog: Catalog) -> list[str]:
-    counts = catalog.count("verdict")
-    return [name, f"{len(catalog):,}", *(f"{counts.get((verdict,), 0):,}" for verdict in VERDICTS)]
+def _row(name: str, counts: Sequence[int]) -> list[str]:
+    return [name, f"{sum(counts):,}", *(f"{count:,}" for count in counts)]

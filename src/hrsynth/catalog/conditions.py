@@ -102,7 +102,8 @@ CONDITIONS: Mapping[str, RecordCondition] = {
         "(said IN (SELECT said FROM texts WHERE instr(text, {0})) OR instr(lower(word), {0}))", _folded
     ),
 }
-"""What can be asked for."""
+"""What can be asked for. With its ``+`` a group is not looked up in the index, which is for names and counts of groups:
+most records are of one group, and are not there in order."""
 LEG_PATTERN = RecordCondition(
     """(word GLOB {0} OR replace(word, '*', '') GLOB {0}
         OR notation IN (SELECT notation FROM chains WHERE chain GLOB {0}))""",
@@ -209,7 +210,8 @@ def places(lines: Sequence[str], asked: Mapping[str, Any], read: Callable[[str],
     left: Sequence[int] = range(len(lines))
     for name, question in questions.items():
         if name == "text":
-            left = [i for i in left if any(_may_hold(lines[i], each) for each in question.values)]
+            sought = [each.decode("utf-8", "surrogatepass") for each in question.values if each is not None]
+            left = [i for i in left if any(_may_hold(lines[i], each) for each in sought)]
         left = [left[i] for i in _fitting([lines[i] for i in left], question, read)]
     return left
 
@@ -254,10 +256,9 @@ def chains(notation: str | None) -> str:
     return json.dumps(sorted({name for each in found if each for name in (each, each.replace("*", ""))}))
 
 
-def _may_hold(line: str, sought: bytes | None) -> bool:
-    """Whether the record of a line may hold a text, or be known by it, without reading it: where the line is as a build
-    writes it, and the text would stand in it letter by letter."""
-    text = (sought or b"").decode("utf-8", "surrogatepass")
+def _may_hold(line: str, text: str) -> bool:
+    """Whether the record of a line may hold a casefolded text, or be known by it, without reading it: where the line is
+    as a build writes it, and the text would stand in it letter by letter."""
     return (
         text in line.casefold()
         or not re.fullmatch(r"[a-z0-9*+!.{|}()-]+( +[a-z0-9*+!.{|}()-]+)*", text)

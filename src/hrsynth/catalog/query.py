@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, overload
+from typing import Any
 
 from ..budgets import MOST_READ_PARTS
 from ..errors import BadRequest
@@ -41,13 +41,7 @@ class ReadRecords(Sequence[Record]):
         """The words of all, none of which is read for that."""
         return [leading_word(each, self._source) for each in self._lines]
 
-    @overload
-    def __getitem__(self, place: int) -> Record: ...
-
-    @overload
-    def __getitem__(self, place: slice) -> Sequence[Record]: ...
-
-    def __getitem__(self, place: int | slice) -> Record | Sequence[Record]:
+    def __getitem__(self, place: Any) -> Any:
         if isinstance(place, slice):
             return [self[i] for i in range(*place.indices(len(self)))]
         found = self._read[place]

@@ -7,12 +7,11 @@ import errno
 import gzip
 import re
 import sqlite3
-from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from importlib import resources
 from pathlib import Path
-from typing import Any, overload
+from typing import Any
 
 from ..budgets import LARGEST_CATALOG, LARGEST_RECORD, MOST_RECORDS
 from ..description.files import open_regular, replacement
@@ -42,54 +41,20 @@ _PLAIN = re.compile(r"CREATE (TABLE|(\w+ )?INDEX)\b(?!.*\bAS\b)", re.IGNORECASE 
 """A table or an index whose columns are not computed, as a SQLite file has it."""
 
 
-class Store(ABC):
-    """Lines of records by group; written whole or not at all."""
+class Folder:
+    """A folder with ``GROUP.jsonl`` for each group, or ``GROUP.jsonl.gz`` for a large one: lines of records by group,
+    written whole or not at all."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
 
-    @abstractmethod
     def groups(self) -> list[str]:
         """The groups that are stored, by name."""
-
-    @abstractmethod
-    def lines(self, groups: Sequence[str], asked: Mapping[str, Any]) -> Sequence[str]:
-        """The lines of groups whose records fit what is asked for (:mod:`.conditions`), sorted by word in each."""
-
-    @abstractmethod
-    def count(self, group: str) -> int:
-        """How many lines a group has."""
-
-    @abstractmethod
-    def values(self, name: str) -> list[Any]:
-        """The values of a field that records have, one of ``FIELDS``, each once, sorted."""
-
-    @abstractmethod
-    def write(self, group: str, lines: Iterable[str]) -> None:
-        """Replace a group."""
-
-    @abstractmethod
-    def journal(self, group: str, *, anew: bool = False) -> Journal:
-        """The journal of a group's build, beside the store."""
-
-    @abstractmethod
-    def file(self, group: str) -> Path:
-        """The file that holds a group."""
-
-
-class Folder(Store):
-    """A folder with ``GROUP.jsonl`` for each group, or ``GROUP.jsonl.gz`` for a large one."""
-
-    def groups(self) -> list[str]:
-        return sorted(
-            {
-                file.name.partition(LINES)[0]
-                for file in self.path.glob(f"*{LINES}*")
-                if file.name.endswith((LINES, PACKED))
-            }
-        )
+        names = (file.name for file in self.path.glob(f"*{LINES}*") if file.name.endswith((LINES, PACKED)))
+        return sorted({name.partition(LINES)[0] for name in names})
 
     def lines(self, groups: Sequence[str], asked: Mapping[str, Any]) -> list[str]:
+        """The lines of groups whose records fit what is asked for (:mod:`.conditions`), sorted by word in each."""
         found, size = list[str](), 0
         for group in groups:
             content = self.content(group)
@@ -117,37 +82,39 @@ class Folder(Store):
             return file, stream.read(most)
 
     def count(self, group: str) -> int:
+        """How many lines a group has."""
         file, content = self._bytes(group, LARGEST_RECORD)
         if file.name.endswith(PACKED):
             content = gunzip(content, file, LARGEST_RECORD, whole=False)
         return head_count(content.partition(b"\n")[0], str(file))
 
     def values(self, name: str) -> list[Any]:
+        """The values of a field that records have, one of ``FIELDS``, each once, sorted."""
         records = (record(line, str(self.path)) for line in self.lines(self.groups(), {}))
         return sorted({value for each in records if (value := each.get(name)) is not None})
 
     def write(self, group: str, lines: Iterable[str]) -> None:
+        """Replace a group."""
         lines = list(lines)
         plain, packed = (self.path / f"{group}{ending}" for ending in (LINES, PACKED))
         large = PACKED_ABOVE < len(lines) < MOST_RECORDS
         content = encode_lines(group, lines, checksum=not large)
         if len(content) > LARGEST_CATALOG:
-            raise BadRequest(
-                f"{self.path / group}: lines of {len(content)} bytes",
-                None,
-                f"up to {LARGEST_CATALOG}, or a SQLite file",
-            )
+            allowed = f"up to {LARGEST_CATALOG}, or a SQLite file"
+            raise BadRequest(f"{self.path / group}: lines of {len(content)} bytes", None, allowed)
         file, other = (packed, plain) if large else (plain, packed)
         with writable(file), replacement(file, sync=True) as draft:
             draft.write_bytes(gzip.compress(content, mtime=0) if large else content)
         other.unlink(missing_ok=True)
 
     def journal(self, group: str, *, anew: bool = False) -> Journal:
+        """The journal of a group's build, beside the store."""
         with writable(self.path):
             self.path.mkdir(exist_ok=True)
         return _open_journal(self.path / f"{group}{LINES}", f"{group}{LINES}", group, anew)
 
     def file(self, group: str) -> Path:
+        """The file that holds a group."""
         packed = self.path / f"{group}{PACKED}"
         return packed if packed.exists() else self.path / f"{group}{LINES}"
 
@@ -167,8 +134,12 @@ class ShippedCatalogs(Folder):
         return Folder(self.path / PUBLISHED)
 
 
-class Database(Store):
-    """One SQLite file with the same lines, and tables that tell which of them fit (:mod:`.conditions`)."""
+class Database:
+    """One SQLite file with the same lines, and tables that tell which of them fit (:mod:`.conditions`); it is asked as
+    a folder is."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
 
     def groups(self) -> list[str]:
         found = self._column('SELECT DISTINCT "group" FROM records ORDER BY 1')
@@ -191,16 +162,16 @@ class Database(Store):
         return int(self._column('SELECT count(*) FROM records WHERE "group" = ?', group)[0])
 
     def values(self, name: str) -> list[Any]:
-        found = self._column(f'SELECT DISTINCT "{name}" FROM records WHERE "{name}" IS NOT NULL ORDER BY 1')
+        found = self._column(
+            f'SELECT DISTINCT records."{name}" FROM records WHERE records."{name}" IS NOT NULL ORDER BY 1'
+        )
         return list(map(bool, found)) if name in FLAGS else found
 
     def write(self, group: str, lines: Iterable[str]) -> None:
-        kept = (
-            {} if not self.path.exists() else {name: self.lines([name], {}) for name in self.groups() if name != group}
-        )
+        others = [name for name in self.groups() if name != group] if self.path.exists() else []
         with writable(self.path), replacement(self.path, sync=True) as draft:
             try:
-                write_tables(draft, {**kept, group: lines})
+                write_tables(draft, {**{name: self.lines([name], {}) for name in others}, group: lines})
             except sqlite3.Error as error:
                 raise BuildStopped(f"{self.path}: {error}") from None
 
@@ -234,6 +205,9 @@ class Database(Store):
         return file
 
 
+Store = Folder | Database
+
+
 class StoredLines(Sequence[str]):
     """Lines of a SQLite file, by the numbers of their rows; each is read when it is looked at."""
 
@@ -244,13 +218,7 @@ class StoredLines(Sequence[str]):
     def __len__(self) -> int:
         return len(self._rows)
 
-    @overload
-    def __getitem__(self, place: int) -> str: ...
-
-    @overload
-    def __getitem__(self, place: slice) -> Sequence[str]: ...
-
-    def __getitem__(self, place: int | slice) -> str | Sequence[str]:
+    def __getitem__(self, place: Any) -> Any:
         if isinstance(place, slice):
             return [self[i] for i in range(*place.indices(len(self)))]
         row = self._rows[place]
