@@ -310,3 +310,15 @@ def test_what_no_architecture_has_is_refused(option: str, value: str, allowed: s
     assert said.out == ""
     assert value in said.err
     assert allowed in said.err
+
+
+@pytest.mark.slow
+def test_published_robots_are_listed_and_shown(run, tmp_path: Path):
+    status, out, _ = run("list", "--catalog", "published", "--group", "2T1R", "--verdict", "controllable")
+    assert status == 0
+    assert "P3RRR1G1P1" in out
+    assert "of 8780 architectures" in out
+    status, out, _ = run("show", "P3RRR1G1P1")
+    assert status == 0
+    assert "choices       joint 1 of each leg: 3" in out
+    check_refused(run("show", "P3RRR1G1P1", "-o", tmp_path / "robot.urdf"), "studies/parroblib")
