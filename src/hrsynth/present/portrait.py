@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -25,8 +24,6 @@ SEEN = "seen"
 STROKES = {BASE: (PAGE["edge"], 2.0), LEG: (PAGE["soft"], 3.0), PLATFORM: (svg.INK, 3.4), SEEN: (svg.WATCHED, 4.6)}
 """Colour and width of what a link is (pixels at the full size of a drawing)."""
 FILLS = {BASE: PAGE["ground"], PLATFORM: PAGE["line"]}
-DIGITS = 4
-"""Significant decimals of a drawing's size in what a page is given."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,19 +118,6 @@ class Portrait:
             + (", the watched segments blue" if legs else "")
             + "."
         )
-
-    def scene(self) -> dict[str, Any]:
-        """What a page is given that turns it: marks about the middle, inside a sphere of diameter one."""
-        every = np.vstack([mark.points for mark in self.marks])
-        middle = (every.min(axis=0) + every.max(axis=0)) / 2
-        size = 2 * float(np.max(np.linalg.norm(every - middle, axis=1))) or 1.0
-        return {
-            "axes": np.round(self.axes, DIGITS).tolist(),
-            "marks": [
-                [mark.kind, mark.role, (np.round((mark.points - middle) / size, DIGITS) + 0.0).tolist(), mark.joint]
-                for mark in self.marks
-            ],
-        }
 
 
 def _draw_mark(mark: Mark, at: list[svg.Place], thin: float) -> str:
