@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from ...present.text.sentences import fewest, shows, where_lost
 from ...present.text.tables import list_words, name_all
 from ..jsonl import Record
 
@@ -47,7 +48,14 @@ def answer(record: Record) -> Iterator[str]:
     """The plain answer, of an architecture that was not refused."""
     if "refused" in record:
         return
-    yield f"Watching all legs shows {record['rank']} of {record['dof']} freedoms."
+    if "see" not in record:
+        unseen = " or ".join(record.get("lost", ()))
+        yield shows([str(k + 1) for k in range(record["legs"])], "legs", record["rank"], record["dof"], unseen)
+    if record.get("minimal"):
+        what = "observations" if "see" in record else "legs"
+        yield fewest(record["minimal"], what, record["rank"], record["dof"])
+    if record.get("condition"):
+        yield where_lost(record["condition"])
     proof = (
         "Proved in exact arithmetic, except for a chance below 1e-9 of what closed loops keep"
         if record["instances"] == 1

@@ -19,8 +19,9 @@ from ..portrait import Portrait
 from ..text.poses import all_of, at_mode, proof_words
 from ..text.robots import at_zero, exact_words, lost_rows, unseen
 from ..text.runs import field_rows
+from ..text.sentences import describe_held, noise_words, things
 from ..text.tables import label_of
-from .answer import answer, describe_held, good, set_rows, things, wrong
+from .answer import answer, good, set_rows
 from .figures import SOURCES, actuators, pairs, step_figures
 from .formulas import collect_symbols, formula, lower_indices, underline_motors
 from .parts import Parts, Refused, ask
@@ -66,9 +67,9 @@ def page(found: Derivation, told: Parts) -> bytes:
             errors=None
             if isinstance(errors, Refused)
             else (
-                f"{errors.blur.inside} of {wrong(errors)}"
+                f"{errors.blur.inside} of {noise_words(errors)}"
                 if errors.blur.noise is None
-                else f"{errors.blur.inside}, {wrong(errors)}"
+                else f"{errors.blur.inside}, {noise_words(errors)}"
             ),
             held=describe_held(found.setting),
             scenes=step_figures(found),
