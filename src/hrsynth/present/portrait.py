@@ -13,7 +13,7 @@ from ..geometry.vectors import Array
 from ..mechanism import Mechanism
 from .drawings import svg
 from .palette import PAGE
-from .sketch import Sketch
+from .sketch import Sketch, seen_along
 from .view.shapes import BASE, LEG, MOTOR, PLATFORM, RADIUS, Drawer
 from .view.view import plane_normal
 
@@ -82,10 +82,7 @@ class Portrait:
         seen = Sketch.of(self.normal, spots, areas)
         if seen.flat:
             return np.vstack([seen.axes, np.cross(*seen.axes)])
-        up, turn = np.radians(seen.view)
-        eye = np.array([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)])
-        right = np.array([-np.sin(turn), np.cos(turn), 0.0])
-        return np.array([right, np.cross(eye, right), eye])
+        return seen_along(seen.view)
 
     def svg(self, width: float, height: float, title: str | None = None) -> str:
         """The drawing, as large as fits; small ones (thumbnails) have thinner strokes."""

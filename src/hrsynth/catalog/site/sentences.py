@@ -26,6 +26,7 @@ RULES = {
     "keep": "Without {legs} the platform would move otherwise; so much is kept, though nothing is measured there.",
 }
 """What each rule did; ``{legs}`` are the legs in which."""
+CONFIRMED = ", confirmed at {confirmed} closed configurations"
 _STEP = re.compile(r"(?P<rule>.*?)(?: (?P<legs>[0-9,]+))?")
 _PART = re.compile(r"(?P<kind>direction|line|encoder) (?P<name>\w+)")
 _PLACE = re.compile(r"(?:link|rod|joint)_(?P<leg>\d+)_(?P<joint>\d+)[ab]?")
@@ -49,23 +50,17 @@ def answer(record: Record) -> Iterator[str]:
     if "refused" in record:
         return
     if "see" not in record:
-        unseen = " or ".join(record.get("lost", ()))
-        yield shows([str(k + 1) for k in range(record["legs"])], "legs", record["rank"], record["dof"], unseen)
+        labels = [str(k + 1) for k in range(record["legs"])]
+        yield shows(labels, "legs", record["rank"], record["dof"], " or ".join(record.get("lost", ())))
     if record.get("minimal"):
-        what = "observations" if "see" in record else "legs"
-        yield fewest(record["minimal"], what, record["rank"], record["dof"])
+        yield fewest(record["minimal"], "observations" if "see" in record else "legs", record["rank"], record["dof"])
     if record.get("condition"):
         yield where_lost(record["condition"])
-    proof = (
-        "Proved in exact arithmetic, except for a chance below 1e-9 of what closed loops keep"
-        if record["instances"] == 1
-        else f"Exact in {record['instances']} instances"
-    )
-    met = f", confirmed at {record['confirmed']} closed configurations" if "confirmed" in record else ""
-    yield f"{proof}{met}."
-    said = cure(record)
-    if said is not None:
-        yield said
+    proof = f"Exact in {record['instances']} instances"
+    if record["instances"] == 1:
+        proof = "Proved in exact arithmetic, except for a chance below 1e-9 of what closed loops keep"
+    yield f"{proof}{CONFIRMED.format(**record) if 'confirmed' in record else ''}."
+    yield from filter(None, [cure(record)])
 
 
 def cure(record: Record) -> str | None:
