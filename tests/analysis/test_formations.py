@@ -33,8 +33,8 @@ from hrsynth.mechanism.model import Mechanism
 from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.mechanism.observations.point import ImagePoint
 from hrsynth.mechanism.sights import NamedCamera
-from hrsynth.present.report.answer import describe_seen
 from hrsynth.present.show import text
+from hrsynth.present.text.sentences import describe_seen
 from hrsynth.present.text.tables import LINE, head
 from strategies import random_rotation
 
@@ -175,7 +175,7 @@ def test_a_ring_of_five_has_one_flex_that_is_named():
     moving = [int(link[1:]) - 1 for link in flex.links]
     assert 9 - rank(matrix[:, [3 * b + k for b in moving for k in range(3)]]) == 1
     assert "1 motion" in flex.name
-    assert flex.name in describe_seen(found)
+    assert flex.name in describe_seen(found.verdict, found.setting.labels, found.setting)
     assert flex.name in text(found)
 
 

@@ -41,8 +41,7 @@ AFTER = 3
 """Pictures during which a crossing is told."""
 SHADES = 32
 """Colours of the file."""
-WATCHED = np.array([[int(palette.colour("watched")[i : i + 2], 16) / 255 for i in (1, 3, 5)]])
-"""What the watched legs are drawn in, (1, 3)."""
+WATCHED = np.array([int(palette.colour("watched")[i : i + 2], 16) / 255 for i in (1, 3, 5)])
 LINE = 38
 """Letters of a line of words."""
 
@@ -56,11 +55,7 @@ def animation(found: Servo) -> bytes:
     require_legs(setting)
     question = setting.samples.question
     stage = LegRenderer(
-        setting.mechanism,
-        _camera(found),
-        question.reference,
-        cylinders(setting.mechanism, question.observations),
-        colours=WATCHED,
+        setting.mechanism, _camera(found), question.reference, cylinders(setting.mechanism, question.observations)
     )
     wanted = _lit(stage.picture(found.target.pose))
     paper = np.where(_bare(wanted)[..., None], 1.0, 1.0 - WANTED * (1.0 - wanted))
@@ -182,11 +177,11 @@ def _moments(places: Array, errors: Array) -> list[int]:
 
 
 def _lit(picture: Array) -> Array:
-    """A picture on black, 0 to 255, as colours between 0 and 1, what is dark grey made lighter."""
+    """A picture on black, 0 to 255, as colours between 0 and 1: watched legs in theirs, dark grey made lighter."""
     bright = picture / 255.0
     high, low = _brightest(bright), -_brightest(-bright)
     grey = (high - low < 0.05) & (high > 0.5 * GREY)
-    return np.where(grey[..., None], 0.6 + 0.0 * bright, bright)
+    return np.where(grey[..., None], 0.6, high[..., None] * WATCHED)
 
 
 def _bare(colours: Array) -> Array:

@@ -14,18 +14,17 @@ from ..analysis.aspects.three_cranks import CrankPlace, mode_counts
 from ..analysis.aspects.words import SAME, SEPARATED, UNDECIDED
 from ..errors import BadRequest
 from ..geometry.vectors import Array
-from . import palette, plots
+from . import plots
 from .modes import why_undrawn
+from .palette import MEANINGS, PAGE, SERIES, tint
 from .paper import PNG, Paper, print_figure
 from .plots import cell_edges, entry, in_style, panels
 
-CELLS = {
-    SAME: (palette.tint(palette.PAGE["good"]), "="),
-    SEPARATED: (palette.tint(palette.PAGE["wrong"]), "|"),
-    UNDECIDED: (palette.PAGE["line"], "?"),
-}
-CURVE, CUSP, NODE = "black", palette.SERIES[1], palette.SERIES[2]
-SHADES = ("white", *(palette.tint(palette.SERIES[0], share) for share in (0.1, 0.22, 0.4)))
+CELLS = {SAME: (tint(PAGE["good"]), "="), SEPARATED: (tint(PAGE["wrong"]), "|"), UNDECIDED: (PAGE["line"], "?")}
+CURVE, CUSP, NODE = "black", SERIES[1], SERIES[2]
+STAR = {"color": MEANINGS["goal"][1], "markeredgecolor": "black"}
+"""The goal."""
+SHADES = ("white", *(tint(SERIES[0], share) for share in (0.1, 0.22, 0.4)))
 """No mode, two, four, six."""
 LEAST_PANEL = 3.0
 """The least width (inches) of one of several drawings."""
@@ -91,7 +90,7 @@ def picture(found: Atlas, drawn: DrawnSection, paper: Paper = PNG) -> bytes:
 def _colour(found: Atlas, number: int) -> str:
     """One colour for all modes of an aspect."""
     groups = [k for k, group in enumerate(found.groups) if number in group]
-    return palette.SERIES[groups[0] % len(palette.SERIES)] if groups else "0.6"
+    return SERIES[groups[0] % len(SERIES)] if groups else "0.6"
 
 
 def _table(place: Any, found: Atlas) -> None:
@@ -147,7 +146,7 @@ def _curves(axes: Any, found: Atlas, drawn: HeldLegSection, modes: dict[int, Cra
             there.plot(*_degrees(one - first, other - second), zorder=4, **style)
             if mark == "o":
                 here.plot(*_degrees(point.crank - crank, point.turn), zorder=4, **style)
-    there.plot(0, 0, "*", color=palette.colour("goal"), markeredgecolor="black", markersize=15, zorder=5)
+    there.plot(0, 0, "*", **STAR, markersize=15, zorder=5)
     for number, at in modes.items():
         x, y = _degrees(float(np.angle(at.cranks[0])) - crank, at.turn)
         here.plot(
@@ -171,14 +170,7 @@ def _curves(axes: Any, found: Atlas, drawn: HeldLegSection, modes: dict[int, Cra
         place.yaxis.set_major_locator(MultipleLocator(30 if np.ptp(shown[1]) < 240 else 60))
     kinds = [
         entry("Type 2 singularities", color=CURVE, linewidth=1.2),
-        entry(
-            "the goal's directions",
-            linestyle="",
-            marker="*",
-            color=palette.colour("goal"),
-            markeredgecolor="black",
-            markersize=11,
-        ),
+        entry("the goal's directions", linestyle="", marker="*", markersize=11, **STAR),
     ]
     nodes = [place for place, _ in drawn.nodes]
     for points, colour, mark, name in ((drawn.cusps, CUSP, "o", "cusp"), (nodes, NODE, "s", "node")):

@@ -16,6 +16,7 @@ from ..simulation.endings.basins import LETTERS, NOT_REACHED, BasinEnd, Basins, 
 from ..simulation.endings.flow import Flags, Places
 from ..tolerances import IN_PLANE
 from . import palette, plots
+from .palette import SERIES
 from .paper import PNG, Paper, print_figure
 from .plots import (
     MapPlane,
@@ -38,10 +39,10 @@ SHADES = {
         palette.tint(palette.colour("mode"), 0.6),
         palette.tint(palette.colour("mode"), 0.3),
     ),
-    ANTIPODAL: (palette.SERIES[3], palette.tint(palette.SERIES[3])),
-    MINIMUM: (palette.SERIES[4], palette.tint(palette.SERIES[4])),
-    BOUNDARY: (palette.SERIES[1], palette.tint(palette.SERIES[1])),
-    SIGHT: (palette.SERIES[5],),
+    ANTIPODAL: (SERIES[3], palette.tint(SERIES[3])),
+    MINIMUM: (SERIES[4], palette.tint(SERIES[4])),
+    BOUNDARY: (SERIES[1], palette.tint(SERIES[1])),
+    SIGHT: (SERIES[5],),
     TIME: ("0.3",),
     UNDECIDED: ("0.5",),
 }

@@ -9,6 +9,7 @@ import numpy as np
 from ..kinematics.configuration import ClosedConfiguration
 from ..simulation.endings.rests import CRITICAL, STABLE, Endings, RestPoint
 from . import palette
+from .palette import SERIES
 from .paper import PNG, Paper, legend_within, print_figure, settle_title
 from .plots import empty_figure, entry, in_style, pose_words
 from .skeleton import legs_of, outline
@@ -22,8 +23,8 @@ WITHIN = 1.6
 LOOKS: dict[str, dict[str, Any]] = {
     "goal": {"color": palette.colour("goal"), "marker": "*", "markersize": 13},
     "mode": {"color": palette.colour("mode"), "marker": "D", "markersize": 8},
-    "antipodal": {"color": palette.SERIES[3], "marker": "s", "markersize": 8},
-    "critical": {"color": palette.SERIES[1], "marker": "o", "markersize": 8},
+    "antipodal": {"color": SERIES[3], "marker": "s", "markersize": 8},
+    "critical": {"color": SERIES[1], "marker": "o", "markersize": 8},
     "other": {"color": "0.6", "marker": "x", "markersize": 5},
 }
 BASE: dict[str, Any] = {"color": "black", "marker": "s", "markersize": 4}

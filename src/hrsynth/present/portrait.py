@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from ..geometry.vectors import Array
 from ..mechanism import Mechanism
 from .drawings import svg
 from .palette import PAGE
-from .sketch import Sketch
+from .sketch import Sketch, seen_along
 from .view.shapes import BASE, LEG, MOTOR, PLATFORM, RADIUS, Drawer
 from .view.view import plane_normal
 
@@ -25,8 +24,6 @@ SEEN = "seen"
 STROKES = {BASE: (PAGE["edge"], 2.0), LEG: (PAGE["soft"], 3.0), PLATFORM: (svg.INK, 3.4), SEEN: (svg.WATCHED, 4.6)}
 """Colour and width of what a link is (pixels at the full size of a drawing)."""
 FILLS = {BASE: PAGE["ground"], PLATFORM: PAGE["line"]}
-DIGITS = 4
-"""Significant decimals of a drawing's size in what a page is given."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,10 +82,7 @@ class Portrait:
         seen = Sketch.of(self.normal, spots, areas)
         if seen.flat:
             return np.vstack([seen.axes, np.cross(*seen.axes)])
-        up, turn = np.radians(seen.view)
-        eye = np.array([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)])
-        right = np.array([-np.sin(turn), np.cos(turn), 0.0])
-        return np.array([right, np.cross(eye, right), eye])
+        return seen_along(seen.view)
 
     def svg(self, width: float, height: float, title: str | None = None) -> str:
         """The drawing, as large as fits; small ones (thumbnails) have thinner strokes."""
@@ -121,19 +115,6 @@ class Portrait:
             + (", the watched segments blue" if legs else "")
             + "."
         )
-
-    def scene(self) -> dict[str, Any]:
-        """What a page is given that turns it: marks about the middle, inside a sphere of diameter one."""
-        every = np.vstack([mark.points for mark in self.marks])
-        middle = (every.min(axis=0) + every.max(axis=0)) / 2
-        size = 2 * float(np.max(np.linalg.norm(every - middle, axis=1))) or 1.0
-        return {
-            "axes": np.round(self.axes, DIGITS).tolist(),
-            "marks": [
-                [mark.kind, mark.role, (np.round((mark.points - middle) / size, DIGITS) + 0.0).tolist(), mark.joint]
-                for mark in self.marks
-            ],
-        }
 
 
 def _draw_mark(mark: Mark, at: list[svg.Place], thin: float) -> str:

@@ -15,6 +15,7 @@ from ..simulation.result import Servo
 from ..simulation.track import TYPE_2
 from ..tolerances import REST_OF_RUN, UNMOVED
 from . import palette
+from .palette import SERIES
 from .paper import PNG, Paper, legend_within, print_figure, settle_title, wrap
 from .plots import empty_figure, entry, in_style, pose_words
 from .skeleton import legs_of, outline
@@ -29,7 +30,7 @@ NAMES, LEGENDS, SCALES, BELOW, PANEL, GAP = 0.95, 1.2, 0.7, 0.55, 1.15, 0.2
 """Room left of the curves, right of them, left of the robot, below both, for a curve under the robot, and between."""
 SHARE, HSPACE = 0.56, 0.18
 """The robot's part of what is left of the width, and the space between two curves over the height of one."""
-START, END, GOAL = ("0.72", "solid"), (palette.SERIES[1], "solid"), (palette.colour("goal"), (0, (4, 2)))
+START, END, GOAL = ("0.72", "solid"), (SERIES[1], "solid"), (palette.colour("goal"), (0, (4, 2)))
 """Colour and stroke of the robot at these."""
 BASE: dict[str, Any] = {"color": "black", "marker": "s", "markersize": 4, "linestyle": ""}
 LONG_NAME = 8
@@ -122,7 +123,7 @@ def _picture(place: Any, found: Servo, eye: NamedCamera, half: Array) -> None:
         middles = np.array(
             [each[0][:-1].mean(axis=0) if len(each[0]) > 2 else each[0].mean(axis=0) for each in ways if each]
         )
-        place.plot(*middles.T, color=palette.SERIES[number % 6], linestyle=STYLES[number % 6], label=seen.leg)
+        place.plot(*middles.T, color=SERIES[number % 6], linestyle=STYLES[number % 6], label=seen.leg)
         for at, (colour, style) in states:
             for stroke in seen.image(*_poses(found, seen, at), size):
                 marker = {"marker": "o", "markersize": 5, "markerfacecolor": "none"} if len(stroke) == 1 else {}
@@ -173,18 +174,14 @@ Curve = tuple[str, Array, str, str]
 def _panels(found: Servo) -> Iterator[tuple[str, list[Curve], float | None]]:
     """What is drawn against time: its name, its curves, the lower end of its scale."""
     names = [f"leg {each.leg}" if each.by_segment else each.leg for each in found.setting.observed]
-    yield (
-        "error ‖eᵢ‖",
-        [(name, found.errors[:, i], palette.SERIES[i % 6], STYLES[i % 6]) for i, name in enumerate(names)],
-        0.0,
-    )
+    yield "error ‖eᵢ‖", [(name, found.errors[:, i], SERIES[i % 6], STYLES[i % 6]) for i, name in enumerate(names)], 0.0
     path, goal = found.way, found.goal_position
     moved = [i for i in range(3) if np.ptp(path[:, i]) > UNMOVED or abs(path[-1, i] - goal[i]) > UNMOVED] or [0]
-    yield "position − goal (m)", [("xyz"[i], path[:, i] - goal[i], palette.SERIES[i], STYLES[i]) for i in moved], None
+    yield "position − goal (m)", [("xyz"[i], path[:, i] - goal[i], SERIES[i], STYLES[i]) for i in moved], None
     if np.degrees(found.turns.max()) > LEAST_TURN:
-        yield "turn from goal\n(degrees)", [("", np.degrees(found.turns), palette.SERIES[0], "solid")], 0.0
+        yield "turn from goal\n(degrees)", [("", np.degrees(found.turns), SERIES[0], "solid")], 0.0
     if np.isfinite(found.track.smallest).any():
-        yield "distance to the\nsingularity (Mᵀ)", [("", found.track.smallest, palette.SERIES[3], "solid")], 0.0
+        yield "distance to the\nsingularity (Mᵀ)", [("", found.track.smallest, SERIES[3], "solid")], 0.0
 
 
 def until(found: Servo) -> float:
@@ -205,7 +202,7 @@ def _robots(figure: Any, found: Servo, above: float, panels: int) -> Box:
     path = found.way
     every = np.vstack([ground, path, *(stroke for each, _ in drawn for stroke, _ in each)])
     sketch = Sketch.of(plane_normal(found.setting.motion), ground, [])
-    entries = [entry("way of the platform", color=palette.SERIES[0]), entry("joints of the base", **BASE)]
+    entries = [entry("way of the platform", color=SERIES[0]), entry("joints of the base", **BASE)]
     if any(np.ptp(stroke, axis=0).any() for each, _ in drawn for stroke, _ in each):
         entries[:0] = [
             entry("robot at the start", color=START[0]),
@@ -213,7 +210,7 @@ def _robots(figure: Any, found: Servo, above: float, panels: int) -> Box:
             entry("robot at the goal", color=GOAL[0], linestyle="dashed"),
         ]
     inside = others[np.all((others >= every.min(axis=0) - 1e-9) & (others <= every.max(axis=0) + 1e-9), axis=1)]
-    marks = [(inside, "D", palette.colour("mode"), "other modes of the goal"), (path[-1:], "o", palette.SERIES[1], "")]
+    marks = [(inside, "D", palette.colour("mode"), "other modes of the goal"), (path[-1:], "o", SERIES[1], "")]
     marks += [
         (
             path[each.place][None],
@@ -237,7 +234,7 @@ def _robots(figure: Any, found: Servo, above: float, panels: int) -> Box:
                 place, stroke, color=colour, linestyle=style, linewidth=2.4 if platform else 1.2, zorder=2 + number
             )
     sketch.stroke(place, ground, zorder=6, **BASE)
-    sketch.stroke(place, path, color=palette.SERIES[0], linewidth=1.6, zorder=7)
+    sketch.stroke(place, path, color=SERIES[0], linewidth=1.6, zorder=7)
     for points, _, look in looks:
         sketch.stroke(place, points, markersize=7, markeredgewidth=1.8, zorder=8, **look)
     return curves

@@ -228,10 +228,7 @@ def _view(spots: Array, curves: Sequence[Array]) -> tuple[float, float]:
     shapes = [(curve - curve.mean(axis=0), *_spread(curve - curve.mean(axis=0))) for curve in curves]
 
     def worth(view: tuple[float, float]) -> float:
-        up, turn = np.radians(view)
-        right = np.array([-np.sin(turn), np.cos(turn), 0.0])
-        high = np.array([-np.sin(up) * np.cos(turn), -np.sin(up) * np.sin(turn), np.cos(up)])
-        page = np.column_stack([right, high])
+        page = seen_along(view)[:2].T
         least = min((float(np.linalg.norm(a - b)) for a, b in combinations(spots @ page / size, 2)), default=APART)
         closed = min(
             (float(np.linalg.svd(v @ page, compute_uv=False)[k]) / spread for v, k, spread in shapes), default=OPEN
@@ -239,6 +236,14 @@ def _view(spots: Array, curves: Sequence[Array]) -> tuple[float, float]:
         return min(least, APART) + 0.5 * min(closed, OPEN) - 1e-4 * (abs(view[0] - 22.0) + abs(view[1] + 55.0))
 
     return max(product((22.0, 15.0, 30.0, 38.0), np.arange(-145.0, 31.0, 10.0).tolist()), key=worth)
+
+
+def seen_along(view: tuple[float, float]) -> Array:
+    """Right, up and towards the eye (3, 3) by rows, seen from elevation and azimuth (degrees)."""
+    up, turn = np.radians(view)
+    eye = np.array([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)])
+    right = np.array([-np.sin(turn), np.cos(turn), 0.0])
+    return np.array([right, np.cross(eye, right), eye])
 
 
 def _spread(v: Array) -> tuple[int, float]:

@@ -58,8 +58,6 @@ class LegRenderer:
     rods: tuple[Cylinder, ...]
     fineness: int = 1
     """Drawn pixels a pixel each way."""
-    colours: Array = field(default_factory=lambda: COLOURS)
-    """Of the watched legs in turn, (n, 3)."""
 
     @cached_property
     def _links(self) -> tuple[str, ...]:
@@ -88,9 +86,7 @@ class LegRenderer:
             drawn = [
                 (ends @ X[:3, :3].T + X[:3, 3], GREY * np.ones(3)) for ends in map(np.array, rods(self.mechanism, link))
             ]
-            watched = [
-                (rod.ends, self.colours[i % len(self.colours)]) for i, rod in enumerate(self.rods) if rod.link == link
-            ]
+            watched = [(rod.ends, COLOURS[i % len(COLOURS)]) for i, rod in enumerate(self.rods) if rod.link == link]
             for ends, colour in watched or drawn:
                 Xml.SubElement(
                     body,

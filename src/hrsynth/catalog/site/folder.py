@@ -17,7 +17,7 @@ STAMP = "site.json"
 """Says that a folder is a site, and of what."""
 FOLDERS = ("p", "r", "d")
 """Folders of the pages, of the robot files and of the small drawings."""
-OWN = frozenset({STAMP, *FOLDERS, "index.html", "data.js", "index.js", "page.js", "turn.js", "site.css"})
+OWN = frozenset({STAMP, *FOLDERS, "index.html", "data.js", "index.js", "page.js", "turn.js", "site.css", "report.css"})
 """All that lies in a site."""
 
 

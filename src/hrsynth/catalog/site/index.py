@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...characters import name_steering
 from ...present import palette
+from ...present.report.pages import environment
 from ...version import __version__
 from ..known import alias, order
 from .folder import FOLDERS
@@ -44,7 +45,7 @@ EXPLAINED = {
     "rules": "The steps from the robot to its hidden robot, with the legs in which they were taken.",
 }
 """What the words of a page mean."""
-SCRIPTS = ("site.css", "index.js", "page.js", "turn.js")
+SCRIPTS = ("site.css", "index.js", "page.js")
 
 
 def write(folder: Path, structures: Iterable[Structure]) -> None:
@@ -53,6 +54,7 @@ def write(folder: Path, structures: Iterable[Structure]) -> None:
     for name in SCRIPTS:
         own = palette.css() if name.endswith(".css") else ""
         (folder / name).write_text(own + assets.joinpath(name).read_text(encoding="utf-8"), encoding="utf-8")
+    (folder / "report.css").write_text(render("style.css.j2"), encoding="utf-8")
     every = list(structures)
     drawn = [int((folder / FOLDERS[2] / f"{each.name}.svg").exists()) for each in every]
     held = {**columns(every), "drawn": drawn}
@@ -113,16 +115,7 @@ def notation(text: str) -> Markup:
 
 @cache
 def _environment() -> Environment:
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    made = Environment(
-        loader=PackageLoader("hrsynth.catalog.site"),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=StrictUndefined,
-    )
-    made.policies["json.dumps_kwargs"] = {"sort_keys": True, "ensure_ascii": False}
+    made: Environment = environment("hrsynth.catalog.site")
     made.filters.update(notation=notation, named=address_name)
     made.globals.update(explained=EXPLAINED)
     return made

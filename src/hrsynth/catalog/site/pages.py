@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +15,10 @@ from ...errors import HrsynthError
 from ...mechanism.model import Mechanism
 from ...present.drawings.schematic import robot_svg
 from ...present.portrait import Portrait
+from ...present.report.pages import PORTRAIT
+from ...present.report.pages import robots as derivation_parts
 from ...present.text.catalog import facts, motors
 from ...present.view.view import plane_normal
-from ...rewrite.strategy import Step
 from ..entry import SAMPLES, model, smallest_sets
 from ..executors import Made, Stopped
 from ..geometry import mechanism
@@ -27,7 +27,7 @@ from ..known import alias
 from ..words import parse
 from .folder import FOLDERS
 from .index import render
-from .sentences import cure, rules
+from .sentences import answer, rules
 from .structures import Structure, address_name
 
 PAGES, ROBOTS, DRAWINGS = FOLDERS
@@ -85,29 +85,30 @@ def _portrait(robot: Mechanism, studied: Study) -> Portrait:
 
 def page(structure: Structure, studied: Study, robots: dict[str, Mechanism], drawn: Portrait | None) -> str:
     """The page; ``robots`` are the mechanisms that are drawn, by word; ``drawn`` is the robot in space."""
-    derivation = studied.derivation
-    hidden = None if derivation is None else derivation.hidden
-    shown = robots.get(structure.fact["word"])
-    real = (
-        None if shown is None else robot_svg(shown, observed=_known_links(studied.observed, shown), title="Real robot")
-    )
+    found, record = studied.derivation, structure.fact
+    shown = robots.get(record["word"])
+    known: dict[str, Any] = {"graphs": [], "things": "legs", "real": record.get("notation", ""), "found": None}
+    if found is not None:
+        known = derivation_parts(found)
+    if shown is not None:
+        known["graphs"][:1] = [robot_svg(shown, observed=_known_links(studied.observed, shown))]
     return render(
         "page.html",
+        **known
+        | {
+            "name": structure.word,
+            "portrait": None if drawn is None else drawn.svg(*PORTRAIT),
+            "answer": list(answer(record)),
+            "pairs": [],
+        },
         structure=structure,
-        fact=structure.fact,
-        facts=list(facts(structure.fact, studied.smallest)),
-        turned=None if drawn is None else drawn.scene(),
-        alias=alias(structure.fact["word"]),
-        cure=cure(structure.fact),
-        rules=list(rules(structure.fact)),
+        record=record,
+        facts=list(facts(record, studied.smallest)),
+        alias=alias(record["word"]),
+        rules=list(rules(record)),
         differs=studied.differs,
-        real=real,
-        hidden=None if hidden is None else robot_svg(hidden, virtual=_driven_joints(hidden), title="Hidden robot"),
-        blind=derivation is not None and hidden is None,
-        steps=[] if derivation is None else trace(derivation.steps),
         variants=[
-            _variant(record, None if "refused" in record else robots.get(record["word"]))
-            for record in structure.records
+            _variant(each, None if "refused" in each else robots.get(each["word"])) for each in structure.records
         ],
     )
 
@@ -119,24 +120,6 @@ def _known_links(links: Iterable[str] | None, robot: Mechanism) -> list[str] | N
 
 def _driven_joints(robot: Mechanism) -> list[str]:
     return [joint.name for joint in robot.joints.values() if joint.actuated]
-
-
-def trace(steps: Iterable[Step]) -> list[dict[str, Any]]:
-    """Steps in order; those in a row that differ by their leg alone are one, with the largest of their angles (rad)."""
-    found = []
-    for (rule, accepted, reason), part in groupby(steps, key=lambda step: (step.rule, step.accepted, step.reason)):
-        alike = list(part)
-        angles = [step.largest_angle for step in alike if step.largest_angle is not None]
-        found.append(
-            {
-                "rule": rule,
-                "legs": ", ".join(step.leg or "all" for step in alike),
-                "accepted": accepted,
-                "reason": reason,
-                "angle": f"{max(angles):.1e}" if angles else "",
-            }
-        )
-    return found
 
 
 def _variant(record: Record, robot: Mechanism | None) -> dict[str, Any]:

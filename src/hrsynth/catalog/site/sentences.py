@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from ...present.text.sentences import fewest, shows, where_lost
 from ...present.text.tables import list_words, name_all
 from ..jsonl import Record
 
@@ -25,6 +26,7 @@ RULES = {
     "keep": "Without {legs} the platform would move otherwise; so much is kept, though nothing is measured there.",
 }
 """What each rule did; ``{legs}`` are the legs in which."""
+CONFIRMED = ", confirmed at {confirmed} closed configurations"
 _STEP = re.compile(r"(?P<rule>.*?)(?: (?P<legs>[0-9,]+))?")
 _PART = re.compile(r"(?P<kind>direction|line|encoder) (?P<name>\w+)")
 _PLACE = re.compile(r"(?:link|rod|joint)_(?P<leg>\d+)_(?P<joint>\d+)[ab]?")
@@ -41,6 +43,24 @@ def rules(record: Record) -> Iterator[str]:
         found = _STEP.fullmatch(step)
         rule, legs = (step, None) if found is None else (found["rule"], found["legs"])
         yield RULES[rule].format(legs=_legs(legs)) if rule in RULES else f"{step[:1].upper()}{step[1:]}."
+
+
+def answer(record: Record) -> Iterator[str]:
+    """The plain answer, of an architecture that was not refused."""
+    if "refused" in record:
+        return
+    if "see" not in record:
+        labels = [str(k + 1) for k in range(record["legs"])]
+        yield shows(labels, "legs", record["rank"], record["dof"], " or ".join(record.get("lost", ())))
+    if record.get("minimal"):
+        yield fewest(record["minimal"], "observations" if "see" in record else "legs", record["rank"], record["dof"])
+    if record.get("condition"):
+        yield where_lost(record["condition"])
+    proof = f"Exact in {record['instances']} instances"
+    if record["instances"] == 1:
+        proof = "Proved in exact arithmetic, except for a chance below 1e-9 of what closed loops keep"
+    yield f"{proof}{CONFIRMED.format(**record) if 'confirmed' in record else ''}."
+    yield from filter(None, [cure(record)])
 
 
 def cure(record: Record) -> str | None:

@@ -4,107 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
-from ...analysis.accuracy.accuracy import Accuracy
 from ...analysis.controllability import Legs
 from ...analysis.derive import Derivation
-from ...analysis.observed import ObservedRobot
 from ...analysis.verdict import Verdict
-from ...geometry.vectors import Array
-from ..text.poses import all_of
 from ..text.robots import exact_cell, unseen
-from .parts import CONE, Parts, Refused
+from ..text.sentences import alike, describe_seen, fewest, things, usual_error, where_lost
+from .parts import Parts, Refused
 
 
 def answer(found: Derivation, told: Parts) -> Iterator[str]:
     """A sentence for each question that has an answer."""
-    yield describe_seen(found)
+    yield describe_seen(found.verdict, found.setting.labels, found.setting)
     if not isinstance(told.legs, Refused):
-        yield enough(found, told.legs)
+        best = max(each.rank for each in told.legs.sets)
+        yield fewest(told.legs.minimal, things(found.setting), best, found.dof)
     if not isinstance(told.singularity, Refused):
-        yield f"Where a freedom is lost: {told.singularity.words}."
-    modes = told.modes
-    if not isinstance(modes, Refused) and modes.found.continuum is None and modes.modes:
-        count = len(modes.modes)
-        yield (
-            f"At home {modes.alike}; a run that starts far away may end at another than its goal."
-            if modes.near
-            else f"At home {count} pose{'s have' if count > 1 else ' has'} the same {describe_held(found.setting)} "
-            f"({all_of(modes)})"
-            + ("; a run that starts far away may end at another than its goal." if count > 1 else ".")
-        )
+        yield where_lost(told.singularity.words)
+    if not isinstance(told.modes, Refused) and (poses := alike(told.modes)) is not None:
+        yield poses
     if not isinstance(told.accuracy, Refused):
-        yield from errors(told.accuracy)
-
-
-def describe_seen(found: Derivation) -> str:
-    """How many freedoms are seen, and what is not."""
-    verdict, watched = found.verdict, _legs(found.setting.labels, found.setting)
-    if (bodies := verdict.formation) is not None:
-        rest = "".join(f"; {each.name}" for each in bodies.flexes) or "; nothing else"
-        return (
-            f"Watching {watched} shows {verdict.rank} of the bodies' {found.dof} freedoms. Not seen: "
-            f"{', '.join(bodies.trivial) or 'no trivial motion'}{rest}."
-        )
-    text = f"Watching {watched} shows {verdict.rank} of the platform's {found.dof} freedoms"
-    return text + (f": not {verdict.named}" if verdict.lost else "") + "."
-
-
-def enough(found: Derivation, legs: Legs) -> str:
-    """Which sets of legs are the smallest that show as much as any."""
-    best = max(each.rank for each in legs.sets)
-    if not best:
-        return f"No set of {things(found.setting)} shows any of the {found.dof} freedoms."
-    sets = "; ".join(_legs(each, found.setting) for each in legs.minimal[:4])
-    more = len(legs.minimal) - 4
-    return (
-        f"Fewest {things(found.setting)} that show {best} of {found.dof}: {sets}"
-        + (f"; {more} more sets" if more > 0 else "")
-        + "."
-    )
-
-
-def errors(found: Accuracy) -> Iterator[str]:
-    """How far the platform may be from where the directions say."""
-    field = found.field
-    assert field is not None
-    said = [
-        f"{_median(values):.2g} {unit}"
-        for values, unit in ((1e3 * field.position, "mm"), (np.degrees(field.orientation), "degrees"))
-        if _median(values) > 0
-    ]
-    if said:
-        what = "Directions" if found.blur.noise is None else "Measurements"
-        yield (
-            f"{what} wrong by {wrong(found)} put the platform off by up to {' and '.join(said)} "
-            "(median over the map below, to first order)."
-        )
-
-
-def _median(values: Array) -> float:
-    finite = values[np.isfinite(values)]
-    return float(np.median(finite)) if finite.size else 0.0
-
-
-def wrong(found: Accuracy) -> str:
-    """How wrong measurements may be, for the map."""
-    return (CONE if found.blur.noise is None else str(found.blur.noise)).replace("deg", "°")
-
-
-def things(setting: ObservedRobot) -> str:
-    """What sets are sets of."""
-    return "legs" if all(o.by_segment for o in setting.observed) else "observations"
-
-
-def describe_held(setting: ObservedRobot) -> str:
-    """What assembly modes have in common."""
-    return "observed directions" if things(setting) == "legs" else "measurements"
-
-
-def _legs(labels: tuple[str, ...] | list[str], setting: ObservedRobot) -> str:
-    known = f"leg{'s' * (len(labels) > 1)} " if things(setting) == "legs" else ""
-    return known + ", ".join(labels)
+        yield from usual_error(told.accuracy)
 
 
 def good(found: Verdict) -> bool:

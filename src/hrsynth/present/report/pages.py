@@ -19,8 +19,9 @@ from ..portrait import Portrait
 from ..text.poses import all_of, at_mode, proof_words
 from ..text.robots import at_zero, exact_words, lost_rows, unseen
 from ..text.runs import field_rows
+from ..text.sentences import describe_held, noise_words, things
 from ..text.tables import label_of
-from .answer import answer, describe_held, good, set_rows, things, wrong
+from .answer import answer, good, set_rows
 from .figures import SOURCES, actuators, pairs, step_figures
 from .formulas import collect_symbols, formula, lower_indices, underline_motors
 from .parts import Parts, Refused, ask
@@ -31,43 +32,46 @@ PORTRAIT = (420.0, 330.0)
 """Width and height of the robot's picture (pixels)."""
 
 
+def robots(found: Derivation) -> dict[str, Any]:
+    """What the page of any robot says of it and of its derivation, by name in the template."""
+    name, observed = found.robot.name, [o.link for o in found.setting.observed]
+    graphs = [robot_svg(found.setting.anatomy, observed=observed, title=f"Scheme of the real robot {name}")]
+    if found.hidden is not None:
+        title = f"Scheme of the hidden robot of {name}"
+        graphs.append(robot_svg(found.hidden, observed=observed, virtual=actuators(found), title=title))
+    return {
+        "found": found,
+        "setting": found.setting,
+        "portrait": Portrait.of(found.setting).svg(*PORTRAIT),
+        "name": name,
+        "graphs": graphs,
+        "real": str(found.architecture),
+        "hidden": found.hidden_architecture and str(found.hidden_architecture),
+        "things": things(found.setting),
+        "watched": ["leg " * o.by_segment + label_of(o) for o in found.setting.observed],
+    }
+
+
 def page(found: Derivation, told: Parts) -> bytes:
     """The page of HTML, without references to anything outside, that says a derivation and the other parts; what is
     refused is told with its reason."""
     name, modes, errors = found.robot.name, told.modes, told.accuracy
-    observed = [o.link for o in found.setting.observed]
-    graphs = [robot_svg(found.setting.anatomy, observed=observed, title=f"Scheme of the real robot {name}")]
-    if found.hidden is not None:
-        graphs.append(
-            robot_svg(
-                found.hidden,
-                observed=observed,
-                virtual=actuators(found),
-                title=f"Scheme of the hidden robot of {name}",
-            )
-        )
     return name_steering(
-        _template().render(
-            found=found,
-            setting=found.setting,
+        environment()
+        .get_template("page.html.j2")
+        .render(
+            **robots(found),
             told=told,
             answer=list(answer(found, told)),
-            portrait=Portrait.of(found.setting).svg(*PORTRAIT),
-            name=name,
-            graphs=graphs,
-            real=str(found.architecture),
-            hidden=found.hidden_architecture and str(found.hidden_architecture),
             pairs=pairs(found),
             errors=None
             if isinstance(errors, Refused)
             else (
-                f"{errors.blur.inside} of {wrong(errors)}"
+                f"{errors.blur.inside} of {noise_words(errors)}"
                 if errors.blur.noise is None
-                else f"{errors.blur.inside}, {wrong(errors)}"
+                else f"{errors.blur.inside}, {noise_words(errors)}"
             ),
-            things=things(found.setting),
             held=describe_held(found.setting),
-            watched=["leg " * o.by_segment + label_of(o) for o in found.setting.observed],
             scenes=step_figures(found),
             modes_picture=None
             if isinstance(modes, Refused) or why_undrawn(modes) is not None
@@ -78,12 +82,14 @@ def page(found: Derivation, told: Parts) -> bytes:
 
 
 @cache
-def _template() -> Any:
-    from jinja2 import Environment, PackageLoader, StrictUndefined
+def environment(package: str = "") -> Any:
+    """The templates of the report, after those of a ``package`` that extends them."""
+    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
+    own = [PackageLoader(package)] if package else []
     environment = Environment(
-        loader=PackageLoader("hrsynth.present.report", "."),
+        loader=ChoiceLoader([*own, PackageLoader("hrsynth.present.report", ".")]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -118,7 +124,7 @@ def _template() -> Any:
         set_rows=set_rows,
         unseen=unseen,
     )
-    return environment.get_template("page.html.j2")
+    return environment
 
 
 def _png(content: bytes) -> str:

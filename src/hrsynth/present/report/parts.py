@@ -20,11 +20,10 @@ from ...analysis.singularity.singular import Singularity, singular
 from ...errors import BadRequest, HrsynthError
 from ...mechanism.pose import Pose
 from ...mechanism.sights import CameraObservation
+from ..view.scale import CONE_TEXT
 
 POINTS = 500
 """Random poses at which the singularity condition is checked."""
-CONE = "0.1deg"
-"""Half-angle of the cones about the directions."""
 PIXELS, LENGTHS = "0.5px", "1mm"
 """Errors in images, and of lengths."""
 MAP_SIDE, COARSE_MAP_SIDE = 101, 25
@@ -82,7 +81,7 @@ def error_plane(setting: ObservedRobot, seed: int) -> Accuracy:
         focal = isinstance(each, CameraObservation) and each.camera is not None and each.camera.focal
         in_picture = "px" in each.found_by and (focal or len(each.found_by) == 1)
         units |= {"px"} if in_picture else each.found_by - {"px"}
-    usual = ",".join(noise for noise, unit in ((CONE, "rad"), (PIXELS, "px"), (LENGTHS, "m")) if unit in units)
+    usual = ",".join(noise for noise, unit in ((CONE_TEXT, "rad"), (PIXELS, "px"), (LENGTHS, "m")) if unit in units)
     blur = Blur.of(None, usual, setting.observed)
     sees_all(setting)
     mapper = Mapper(setting, blur)

@@ -16,13 +16,6 @@ from ...mechanism.pose import Pose
 from ...results import Value
 from .states import page_values, place
 
-NOT_ASSEMBLED = {
-    "no": " (cannot be assembled)",
-    "beyond limits": " (only beyond limits)",
-    "not found": " (assembly not found)",
-}
-"""What is said of a mode that the robot does not reach."""
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ModeOutline(Value):
@@ -51,7 +44,7 @@ class ModeOutline(Value):
         places = [None if each is None else page_values(each[None])[0] for each in self.places]
         return {
             "label": self.label,
-            "words": self.words + NOT_ASSEMBLED.get(self.assembly, ""),
+            "words": self.words + f" (assembled: {self.assembly})" * (self.assembly != "yes"),
             "reachable": self.reachable,
             "places": places,
         }

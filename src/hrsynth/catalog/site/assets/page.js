@@ -4,7 +4,6 @@ const rows = [...document.querySelectorAll("#variants [data-name]")];
 
 /** Grey the joints that have a motor, and say so. */
 function mark(motors) {
-  drive(motors);
   for (const joint of document.querySelectorAll("#real [data-joint]")) {
     const driven = joint.dataset.joint.split("\n").some((name) => motors.has(name));
     joint.parentNode.setAttribute("class", driven ? "motor" : "joint");
