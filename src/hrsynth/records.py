@@ -82,17 +82,17 @@ class Member:
 
 
 class Record:
-    """What tells its members as JSON; all fields of a dataclass that is declared ``all_told``."""
+    """What tells its members as JSON; all fields of a dataclass that is declared ``all_recorded``."""
 
-    all_told: ClassVar = False
+    all_recorded: ClassVar = False
 
-    def __init_subclass__(cls, all_told: bool = False, **more: Any) -> None:
+    def __init_subclass__(cls, all_recorded: bool = False, **more: Any) -> None:
         super().__init_subclass__(**more)
-        cls.all_told = all_told
+        cls.all_recorded = all_recorded
 
     def to_dict(self) -> Json:
         """The members by name, as JSON has them: null for what is not finite."""
-        return _told(self)
+        return _members_of(self)
 
     def to_row(self) -> dict[str, Any]:
         """The same in one level, a row of a table (``pandas.DataFrame([found.to_row(), ...])``): members of members are
@@ -145,7 +145,7 @@ class OfRobot(Head):
     platform: Platform
 
 
-def _told(value: Any, scale: float | None = None) -> dict[str, Any]:
+def _members_of(value: Any, scale: float | None = None) -> dict[str, Any]:
     """The members of a record or a named tuple."""
     found: dict[str, Any] = {}
     for member in members(type(value)):  # type: ignore[arg-type]
@@ -163,11 +163,11 @@ def plain(value: Any, how: As = As()) -> Any:
     if value is None or isinstance(value, bool | str):
         return value
     if hasattr(value, "to_dict"):
-        return value.to_dict() if how.scale is None else _told(value, how.scale)
+        return value.to_dict() if how.scale is None else _members_of(value, how.scale)
     if isinstance(value, Mapping):
         return {name: plain(each, how) for name, each in value.items()}
     if hasattr(value, "_fields"):
-        return _told(value)
+        return _members_of(value)
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, float):
@@ -197,7 +197,7 @@ def members(kind: type) -> tuple[Member, ...]:
     found: dict[str, Member] = {}
     for base in reversed(kind.__mro__):
         known = vars(base).get("__annotations__", {})
-        named = issubclass(base, tuple) or vars(base).get("all_told", False)
+        named = issubclass(base, tuple) or vars(base).get("all_recorded", False)
         told = {name: hint for name, hint in known.items() if named or str(hint).startswith("Annotated[")}
         place = vars(sys.modules[base.__module__])
         hints = get_type_hints(SimpleNamespace(__annotations__=told), place, include_extras=True)
@@ -248,8 +248,8 @@ def schema(kind: Any, parts: dict[str, Any]) -> dict[str, Any]:
         return {"type": "array", "items": schema(values[0], parts)}
     if origin in (dict, Mapping):
         return {"type": "object", "additionalProperties": schema(values[1], parts)}
-    if told_type(kind) is not kind:
-        return schema(told_type(kind), parts)
+    if recorded_type(kind) is not kind:
+        return schema(recorded_type(kind), parts)
     if kind.__name__ not in parts:
         parts[kind.__name__] = {}
         parts[kind.__name__] = {"description": summary(kind), **object_schema([kind], parts)}
@@ -261,7 +261,7 @@ def object_schema(kinds: Sequence[Any], parts: dict[str, Any]) -> dict[str, Any]
     properties: dict[str, Any] = {}
     required: set[str] = set()
     for kind in kinds:
-        for member in members(told_type(kind)):
+        for member in members(recorded_type(kind)):
             if not member.how.flat:
                 told = {"description": member.words} if member.words else {}
                 properties[member.name] = {**schema(member.kind, parts), **told}
@@ -279,7 +279,7 @@ def summary(kind: type) -> str:
     return re.split(r"\.(?:\s|$)|[;:,] ``", " ".join((kind.__doc__ or "").split()), maxsplit=1)[0] + "."
 
 
-def told_type(kind: Any) -> Any:
+def recorded_type(kind: Any) -> Any:
     """The class whose members are told of another: itself, or what its own ``to_dict`` says that it gives."""
     own = getattr(kind, "to_dict", Record.to_dict)
     return kind if own is Record.to_dict else get_type_hints(own)["return"]

@@ -176,7 +176,7 @@ class Cure(Value):
     price: Annotated[float, ""]
     """Of all of them together; each is 1 where nothing else is said."""
 
-    told_verdict = Shown(Word, lambda self: self.verdict.verdict, As("verdict"))
+    verdict_record = Shown(Word, lambda self: self.verdict.verdict, As("verdict"))
     rank = Shown(int, lambda self: self.verdict.rank)
     gap = Shown(float, lambda self: self.verdict.gap, GAP)
     rank_at_zero = Shown(int, lambda self: self.verdict.rank_at_zero, OPTIONAL)

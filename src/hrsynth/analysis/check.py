@@ -121,10 +121,10 @@ class Check(Result, shown_as="check"):
         states += [f"{each.pose} not reached" for each in self.unreached]
         return f"{self.setting.headline()}: {'; '.join(states)}"
 
-    told_unreached = Shown(
+    unreached_record = Shown(
         list[Unreached], lambda self: [Unreached(each.pose, each.reason) for each in self.unreached], As("unreached")
     )
-    watched = Shown(list[WatchedAxis], lambda self: self.setting.told_watched)
+    watched = Shown(list[WatchedAxis], lambda self: self.setting.watched_record)
     mobility = Shown(MobilityWritten, lambda self: self.setting.mobilities)
     unlimited = Shown(list[str], lambda self: self.setting.unlimited, UNLIMITED)
 

@@ -47,7 +47,7 @@ def gap_of(found: Relation) -> float:
 
 
 @dataclass(frozen=True)
-class Classes(Record, all_told=True):
+class Classes(Record, all_recorded=True):
     """Zlatanov's six: RI, RO, RPM, IIM as excess, II, IO as deficit over the generic values.
 
     RO = dim {t : (t, 0) ∈ ρ}, RI = dim {u̇ : (0, u̇) ∈ ρ}, RPM = dim {q̇ : t = 0, u̇ = 0}, IIM = mobility,
@@ -99,7 +99,7 @@ def interaction_matrix(found: Relation) -> Array | None:
 
 
 @dataclass(frozen=True)
-class Redundancy(Record, all_told=True):
+class Redundancy(Record, all_recorded=True):
     """``rows`` constraints of the loop that the file calls ``loop`` repeat what earlier loops say already; at
     generic configurations where ``generic``."""
 

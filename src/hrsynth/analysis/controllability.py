@@ -82,11 +82,11 @@ class Legs(Result, shown_as="legs"):
 
     @property
     @recorded(As("sets"))
-    def told_sets(self) -> list[LegSet]:
+    def sets_record(self) -> list[LegSet]:
         """The sets, each with what generic geometry of the same architecture sees."""
         return [LegSet(each, exact.exact, exact) for each, exact in zip(self.sets, self.exact, strict=True)]
 
-    watched = Shown(list[WatchedAxis], lambda self: self.setting.told_watched)
+    watched = Shown(list[WatchedAxis], lambda self: self.setting.watched_record)
     operation_mode = Shown(OperationModeRecord, lambda self: self.setting.operation_mode)
     other_modes = Shown(list[OtherMode], lambda self: self.setting.other_modes)
 

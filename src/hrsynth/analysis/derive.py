@@ -147,8 +147,8 @@ class Derivation(Result, shown_as="derive"):
             return Notation(real.unicode, None, real.ascii, None, None)
         return Notation(real.unicode, hidden.unicode, real.ascii, hidden.ascii, hidden.latex)
 
-    told_verdict = Shown(Verdict, lambda self: self.verdict, As(flat=True, without=("legs", "gap")))
-    told_mobility = Shown(MobilityWritten, lambda self: self.setting.mobilities, As("mobility"))
+    verdict_record = Shown(Verdict, lambda self: self.verdict, As(flat=True, without=("legs", "gap")))
+    mobility_record = Shown(MobilityWritten, lambda self: self.setting.mobilities, As("mobility"))
     point_platform = Shown(bool, lambda self: self.setting.anatomy.point is not None)
     operation_mode = Shown(OperationModeRecord, lambda self: self.setting.operation_mode)
     other_modes = Shown(list[OtherMode], lambda self: self.setting.other_modes)

@@ -87,7 +87,7 @@ def following(found: Iterable[Sensed], twists: Mapping[str, Numbers]) -> tuple[N
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Flex(Value, all_told=True):
+class Flex(Value, all_recorded=True):
     """``count`` independent motions of some links while all others rest and no measured value changes."""
 
     links: tuple[str, ...]

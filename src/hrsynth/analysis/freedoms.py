@@ -20,7 +20,7 @@ _AXES = "xyz"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Freedom(Value, all_told=True):
+class Freedom(Value, all_recorded=True):
     """A twist (vx, vy, vz, wx, wy, wz) at the platform frame's origin, base axes (m, rad), with its name."""
 
     twist: Annotated[

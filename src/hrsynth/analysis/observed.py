@@ -57,7 +57,7 @@ LegsLike = Annotated[
 
 
 @dataclass(frozen=True)
-class Mobility(Record, all_told=True):
+class Mobility(Record, all_recorded=True):
     """Freedoms of a mechanism: all of them, and those that move neither the platform nor any default segment."""
 
     total: int
@@ -313,14 +313,16 @@ class ObservedRobot(Value):
         members = tuple(Sample(at, (), relation(at, question)) for at in self.configurations)
         return replace(drawn, question=question, members=members)
 
-    told_camera = Shown(str, lambda self: self.mechanism.reference, As("camera"), "the link from which it is observed")
+    camera_record = Shown(
+        str, lambda self: self.mechanism.reference, As("camera"), "the link from which it is observed"
+    )
 
     def watched(self) -> tuple[tuple[Observation, str], ...]:
         """What is observed, and why it is that."""
         return tuple((each, reason(self.anatomy, each)) for each in self.observed)
 
     @property
-    def told_watched(self) -> list[WatchedAxis]:
+    def watched_record(self) -> list[WatchedAxis]:
         """The same as JSON has it."""
         return [{**each.to_dict(), "why": why} for each, why in self.watched()]
 

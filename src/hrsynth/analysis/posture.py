@@ -38,7 +38,7 @@ UNDECIDED, REGULAR, CONSTRAINT = "undecided", "regular", "constraint"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Kinds(Value, all_told=True):
+class Kinds(Value, all_recorded=True):
     """What one relation says at a configuration: the freedoms that are seen, the gap of all ranks, the six counts (None
     where the gap is too small for a verdict) and the freedoms that are not seen."""
 
@@ -63,7 +63,7 @@ class Kinds(Value, all_told=True):
 
 
 @dataclass(frozen=True)
-class Distances(Record, all_told=True):
+class Distances(Record, all_recorded=True):
     """How far a configuration is from each kind (0: there); lengths in characteristic lengths.
 
     ``type2`` is the smallest singular value of Mᵀ on the feasible twists that are generically seen, ``type1`` one over

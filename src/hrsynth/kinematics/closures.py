@@ -28,7 +28,7 @@ from .ways import Part
 
 
 @dataclass(frozen=True)
-class Miss(Record, all_told=True):
+class Miss(Record, all_recorded=True):
     """Why a leg does not close, and by how much at least (m, or rad)."""
 
     words: Annotated[str, As("reason")]

@@ -48,7 +48,7 @@ class LintRule:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Finding(Value, all_told=True):
+class Finding(Value, all_recorded=True):
     """One thing that is wrong, doubtful or lost, with its file and line and what to do about it."""
 
     rule: str

@@ -67,7 +67,7 @@ class Lint(Result, shown_as="lint"):
         """Whether a finding is at least that bad; a file that cannot be read is."""
         return bool(self.unread) or any(each.rank >= SEVERITIES.index(severity) for each in self.findings)
 
-    told_unread = Shown(
+    unread_record = Shown(
         list[Unread], lambda self: [Unread(each.file, each.line, each.text) for each in self.unread], As("unread")
     )
 

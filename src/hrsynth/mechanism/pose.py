@@ -266,13 +266,13 @@ class Grid(Value):
 
     @property
     @recorded(FLAT)
-    def told_values(self) -> GridValues:
+    def values_record(self) -> GridValues:
         """The values of the parts that vary."""
         return cast(GridValues, dict(self.axes))
 
     @property
     @recorded(As("fixed"))
-    def told_fixed(self) -> FixedParts:
+    def fixed_record(self) -> FixedParts:
         """The parts of the pose that the grid holds fixed."""
         parts = {name: values if name == "rpy" else values[0] for name, values in self.fixed.given.items()}
         return cast(FixedParts, parts)

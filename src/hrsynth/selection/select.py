@@ -140,7 +140,7 @@ class ModeCount(Record):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Decision(Compared, all_told=True):
+class Decision(Compared, all_recorded=True):
     """A verdict in a word, and its reason."""
 
     verdict: str
@@ -247,14 +247,14 @@ class Selection(Result, shown_as="select"):
 
     @property
     @recorded(As("cones"))
-    def told_cones(self) -> dict[str, float]:
+    def cones_record(self) -> dict[str, float]:
         """The half-angles of the cones by leg, in degrees."""
         angles = np.degrees(self.blur.cones).tolist()
         return {o.leg: cone for o, cone in zip(self.setting.observed, angles, strict=True) if cone}
 
     @property
     @recorded(As("sight"))
-    def told_sight(self) -> SightRecord | None:
+    def sight_record(self) -> SightRecord | None:
         """The camera; None where none was asked for."""
         eye = self.sight
         return None if eye is None else SightRecord(eye.reference, eye.camera.place, eye.camera.focal)

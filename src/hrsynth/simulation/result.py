@@ -26,7 +26,7 @@ ASIDE = 0.9
 
 
 @dataclass(frozen=True)
-class Scatter(Record, all_told=True):
+class Scatter(Record, all_recorded=True):
     """How far the platform was from the pose at which it settled, over the second half of a noisy run: metres and
     radians, largest and root mean square."""
 
@@ -125,7 +125,7 @@ class Servo(Result, shown_as="servo"):
         R = at.pose(motion.link)[:3, :3] @ self.target.pose(motion.link)[:3, :3].T
         return angle_of(R) if motion.body else 0.0
 
-    told_noise = Shown(str | None, lambda self: self.noise and str(self.noise), As("noise"))
+    noise_record = Shown(str | None, lambda self: self.noise and str(self.noise), As("noise"))
     modes = Shown(list[AssemblyMode] | None, lambda self: self.ending.modes and self.ending.modes.modes)
     type2 = Shown(TrackRecord, lambda self: self.track.timed(self.run.times))
     unlimited = Shown(list[str], lambda self: self.setting.unlimited, UNLIMITED)

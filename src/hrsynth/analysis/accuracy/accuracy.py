@@ -84,14 +84,14 @@ class Accuracy(Result, shown_as="accuracy"):
 
     @property
     @recorded(As("cones"))
-    def told_cones(self) -> list[Cone]:
+    def cones_record(self) -> list[Cone]:
         """The cones about directions that have one."""
         pairs = zip(self.setting.observed, self.cones, strict=True)
         return [Cone(o.leg, o.link, cone) for o, cone in pairs if cone]
 
     @property
     @recorded(As("poses"))
-    def told_poses(self) -> list[SampledErrors]:
+    def poses_record(self) -> list[SampledErrors]:
         """The errors at single poses."""
         return [SampledErrors(*each) for each in zip(self.poses, self.sampled, strict=True)]
 

@@ -55,7 +55,7 @@ class Seen(Value):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Spots(Value, all_told=True):
+class Spots(Value, all_recorded=True):
     """Random poses of a grid at which Pinocchio's relation gave the same error maxima: how many, and the largest
     difference (relative)."""
 

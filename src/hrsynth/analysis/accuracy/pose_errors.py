@@ -63,7 +63,7 @@ class ErrorEllipsoid(Value):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PoseErrors(Value, all_told=True):
+class PoseErrors(Value, all_recorded=True):
     """The error maxima at a pose: position (m) and orientation (rad)."""
 
     pose: Pose

@@ -25,7 +25,7 @@ from .pose_errors import PoseErrors
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Sampled(Value, all_told=True):
+class Sampled(Value, all_recorded=True):
     """What the robot truly does with ``count`` errors on the cones' borders, the linearly worst ones first, each led
     there from none: the largest position (m) and orientation error (rad) met on these ways.
 

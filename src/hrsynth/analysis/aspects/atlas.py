@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ModePair(Value, all_told=True):
+class ModePair(Value, all_recorded=True):
     """What is known of two modes, by their numbers: ``answer`` is that of ``path`` (None where nothing was asked),
     ``via`` the modes over which the verdict follows from those of other pairs."""
 

@@ -37,7 +37,7 @@ Numbers = Sequence[Any] | NDArray[Any]
 
 
 @dataclass(frozen=True)
-class SectionPoint(Record, all_told=True):
+class SectionPoint(Record, all_recorded=True):
     """A place of the surface: the turn of the first crank's w₀ in the plane, that of the platform since the goal, and
     the directions of e₁, e₂ (rad). ``radius``: of the box that is proved to hold exactly one such point (rad,
     characteristic lengths), for all geometries within ``tolerances.FOLLOWED``; None where it was found alone."""
@@ -59,7 +59,7 @@ class HeldLegSection(Record):
     cusps: Annotated[tuple[SectionPoint, ...], ""]
     nodes: Annotated[tuple[tuple[SectionPoint, SectionPoint], ...], ""]
 
-    told_held = Shown(str, lambda self: self.robot.labels[0], As("held"))
+    held_record = Shown(str, lambda self: self.robot.labels[0], As("held"))
     directions = Shown(list[str], lambda self: self.robot.labels[1:])
 
 

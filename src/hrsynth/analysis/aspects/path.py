@@ -48,7 +48,7 @@ class PathEnd(Value):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SampledRoad(Value, all_told=True):
+class SampledRoad(Value, all_recorded=True):
     """The condition at ``count`` poses on the straight path between two poses: the smallest |value|, and ``at`` which
     pose; how often its sign changes from one to the next (None for a value without sign); the part of the path that was
     ``reached``, and what was first seen not to be in front of its camera. Nothing is known between the poses."""

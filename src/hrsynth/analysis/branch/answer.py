@@ -20,7 +20,7 @@ BACK = "low and high of a box of all motors, no two of which give the platform o
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class BranchCell(Value, all_told=True):
+class BranchCell(Value, all_recorded=True):
     """A cell low ≤ q ≤ high (n,) of a part's motors, and the tube |x − centre − slopes (q − middle)| ≤ radius (p,) of
     its passive coordinates that contains exactly one closure for every q of the cell (m, rad).
 
@@ -52,7 +52,7 @@ class BranchCell(Value, all_told=True):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Toggle(Value, all_told=True):
+class Toggle(Value, all_recorded=True):
     """A place where the proof ends, found in floating point: motors ``q`` (n,) of a part at which, as far as numbers
     tell, the ``joints`` can move while all motors are held (a determinant vanishes); ``loops`` are those that they
     close. Without joints: no such place was found, and the proof was given up for its ``reason``."""
@@ -64,7 +64,7 @@ class Toggle(Value, all_told=True):
 
 
 @dataclass(frozen=True)
-class BranchLimit(Value, all_told=True):
+class BranchLimit(Value, all_recorded=True):
     """A joint without a motor, its limits (m, rad; both None: the cone of a ball), its least and largest coordinate in
     the proved cells to a tube's radius (None if its loop is cut there), and the verdict: ``kept`` (proved), ``passed``
     (proved: beyond them somewhere in the cells), ``undecided``, ``not looked at``."""

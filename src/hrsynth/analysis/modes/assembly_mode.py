@@ -92,7 +92,7 @@ class AssemblyMode(Record):
         """The larger of the shift (characteristic lengths) and the turn (rad)."""
         return max(self.shift / self.length, self.turn)
 
-    told_radius = Shown(Number, lambda self: self.radius, As("radius"), "null if it is not known")
+    radius_record = Shown(Number, lambda self: self.radius, As("radius"), "null if it is not known")
     radius_m = Shown(Number, lambda self: self.shift if np.isfinite(self.radius) else None)
     radius_rad = Shown(Number, lambda self: self.turn if np.isfinite(self.radius) else None)
     reasons = Shown(list[LegMissed], lambda self: [LegMissed(*each) for each in self.misses])

@@ -187,13 +187,13 @@ class AssemblyModes(Result, shown_as="modes"):
     observed = Shown(tuple[Observation, ...], lambda self: self.setting.observed)
     complex = Shown(int | None, lambda self: None if self.found.continuum else self.found.complex)
     complete = Shown(bool, lambda self: self.found.complete)
-    told_bound = Shown(str, lambda self: self.found.bound, As("bound"))
+    bound_record = Shown(str, lambda self: self.found.bound, As("bound"))
     proof = Shown(str, lambda self: self.found.proof)
-    told_modes = Shown(list[ListedMode], lambda self: self._listed(self.modes), As("modes"))
-    told_antipodal = Shown(list[ListedMode], lambda self: self._listed(self.antipodal), As("antipodal"))
+    modes_record = Shown(list[ListedMode], lambda self: self._listed(self.modes), As("modes"))
+    antipodal_record = Shown(list[ListedMode], lambda self: self._listed(self.antipodal), As("antipodal"))
     degenerate = Shown(str | None, lambda self: self.found.degenerate)
     continuum = Shown(int | None, lambda self: self.found.continuum)
-    told_motions = Shown(
+    motions_record = Shown(
         list[FollowedMotion],
         lambda self: [FollowedMotion(self.pose_of(each), each) for each in self.motions],
         As("motions"),

@@ -59,7 +59,7 @@ class Agreement(Value):
 
     positive = Shown(int, lambda self: self.sides[0])
     negative = Shown(int, lambda self: self.sides[1])
-    told_on_locus = Shown(int, lambda self: len(self.on_locus), As("on_locus"))
+    on_locus_record = Shown(int, lambda self: len(self.on_locus), As("on_locus"))
 
 
 def agreement(

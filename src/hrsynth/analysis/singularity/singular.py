@@ -107,7 +107,7 @@ class Singularity(Result, shown_as="singular"):
         return Measured("motors" if self.real else "directions", [getattr(o, "joint", o.link) for o in seen])
 
     dof = Shown(int, lambda self: self.verdict.dof)
-    told_verdict = Shown(Word, lambda self: self.verdict.verdict, As("verdict"))
+    verdict_record = Shown(Word, lambda self: self.verdict.verdict, As("verdict"))
     lost = Shown(tuple[Freedom, ...], lambda self: self.verdict.lost)
     never = Shown(bool, lambda self: self.condition is not None and self.condition.never)
     expression = Shown(str, lambda self: "0" if self.condition is None else str(self.condition.expression))
@@ -121,7 +121,7 @@ class Singularity(Result, shown_as="singular"):
         return [] if self.condition is None else [Factor(str(part), meaning) for part, meaning in self.condition.parts]
 
     characteristic_length = Shown(float, lambda self: self.setting.mechanism.length)
-    told_checked = Shown(
+    checked_record = Shown(
         Agreement | Unchecked, lambda self: Unchecked(0, 0) if self.checked is None else self.checked, As("checked")
     )
 

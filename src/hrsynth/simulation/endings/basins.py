@@ -177,11 +177,11 @@ class Basins(Result, shown_as="basins"):
 
     poses = Shown(str, lambda self: str(self.grid))
     axes = Shown(dict[str, list[float]], lambda self: dict(self.grid.axes))
-    told_damped = Shown(int, lambda self: np.sum(self.damped), As("damped"))
+    damped_record = Shown(int, lambda self: np.sum(self.damped), As("damped"))
 
     @property
     @recorded(As("certified"))
-    def told_certified(self) -> CertifiedPart | None:
+    def certified_record(self) -> CertifiedPart | None:
         """What is certified; None where nothing was sought."""
         return None if self.certified is None else CertifiedPart(self.certified, self.covered)
 

@@ -123,7 +123,7 @@ class SignedModes(Value):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class BoxedRest(Value, all_told=True):
+class BoxedRest(Value, all_recorded=True):
     """A pose about which boxes prove exactly one critical point of E, ‖e‖ in ``error``, that is no rest of the list:
     the robot was not closed there, or the command as it is computed does not vanish, as where joints lock or nearly
     do; so whether the loop rests there is not said. ``pose`` is that of the point alone from which boxes count if the
@@ -241,7 +241,7 @@ class RestCover(Value):
     proved = Shown(int, lambda self: len(self.cover.found), "critical poses")
     open = Shown(int, lambda self: len(self.cover.open), "boxes")
     turns = Shown(int, lambda self: len(self.cover.turns), "of a platform that only translates")
-    told_reason = Shown(str | None, lambda self: self.reason or None, As("reason"))
+    reason_record = Shown(str | None, lambda self: self.reason or None, As("reason"))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -306,7 +306,7 @@ class Endings(Result, shown_as="endings"):
 
     complex = Shown(int | None, lambda self: self.lists[0].complex)
     proof = Shown(str, lambda self: self.search.words)
-    told_attracting = Shown(int, lambda self: len(self.attracting), As("attracting"))
+    attracting_record = Shown(int, lambda self: len(self.attracting), As("attracting"))
 
 
 def stability(curvatures: Sequence[float] | Array, least: float = SAME_ENDING) -> str:
