@@ -44,6 +44,13 @@ def say(text: str, *, err: bool = False, paint: Callable[[str], str] = str) -> N
         close(sys.stderr)
 
 
+def overwrite(text: str) -> None:
+    """Write the line of standard error from its beginning, clear the rest, and go back: what is written next takes its
+    place."""
+    with contextlib.suppress(OSError, ValueError):
+        print(f"\r{escape_steering(text)}\x1b[K", end="\r", file=sys.stderr, flush=True)
+
+
 def close(stream: object) -> None:
     """Let a stream that takes nothing more lead nowhere, so that no later write, or that at exit, fails."""
     with contextlib.suppress(OSError, ValueError):
