@@ -316,8 +316,6 @@ class ObservedRobot(Value):
     camera_record = Shown(
         str, lambda self: self.mechanism.reference, As("camera"), "the link from which it is observed"
     )
-        str, lambda self: self.mechanism.reference, As("camera"), "the link from which it is observed"
-    )
 
     def watched(self) -> tuple[tuple[Observation, str], ...]:
         """What is observed, and why it is that."""

@@ -44,9 +44,11 @@ def say(text: str, *, err: bool = False, paint: Callable[[str], str] = str) -> N
         close(sys.stderr)
 
 
-def rewrite_line(text: str) -> None:
-    """Write a line of standard error from its beginning, clear its rest, and go back."""
-    print(f"\r{escape_steering(text)}\x1b[K", end="\r", file=sys.stderr, flush=True)
+def overwrite(text: str) -> None:
+    """Write the line of standard error from its beginning, clear the rest, and go back: what is written next takes its
+    place."""
+    with contextlib.suppress(OSError, ValueError):
+        print(f"\r{escape_steering(text)}\x1b[K", end="\r", file=sys.stderr, flush=True)
 
 
 def close(stream: object) -> None:

@@ -3,7 +3,6 @@ now and then once half a minute has."""
 
 from __future__ import annotations
 
-import contextlib
 import os
 import shutil
 import sys
@@ -13,8 +12,7 @@ from collections import deque
 from datetime import timedelta
 from typing import Self
 
-from ..characters import escape_steering
-from .colour import rewrite_line, say
+from .colour import overwrite, say
 
 SPEED_OVER = 600.0
 """Seconds over which the speed of a build is averaged: words differ much."""
@@ -53,7 +51,7 @@ class Progress:
             self._start = float("inf")
             if self._written is not None:
                 self._write()
-                self._put("")
+                overwrite("")
         self._timer.cancel()
 
     def tell(self, what: str) -> None:
@@ -64,15 +62,15 @@ class Progress:
         """So many of a part's records are there."""
         self._parts[part] = done, total
         there, self._total = map(sum, zip(*self._parts.values(), strict=True))
+        self._known.append((time.monotonic(), there))
+        while self._known[-1][0] - self._known[0][0] > SPEED_OVER:
+            self._known.popleft()
         self._show(part, there)
 
     def _show(self, what: str, done: int) -> None:
         with self._lock:
             now = time.monotonic()
-            self._what, self._done = escape_steering(what), done
-            self._known.append((now, done))
-            while now - self._known[0][0] > SPEED_OVER:
-                self._known.popleft()
+            self._what, self._done = what, done
             if self._terminal and now >= self._start and now - (self._written or self._began) >= OFTEN:
                 self._write()
 
@@ -95,13 +93,7 @@ class Progress:
 
     def _write(self) -> None:
         self._written = time.monotonic()
-        self._put(self._line(self._written)[: shutil.get_terminal_size().columns - 1])
-
-    @staticmethod
-    def _put(text: str) -> None:
-        """Write from the line's beginning, clear the rest, and go back: what anybody else writes takes its place."""
-        with contextlib.suppress(OSError, ValueError):
-            rewrite_line(text)
+        overwrite(self._line(self._written)[: shutil.get_terminal_size().columns - 1])
 
     def _line(self, now: float) -> str:
         if not self._total:
