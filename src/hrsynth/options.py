@@ -76,6 +76,15 @@ class Option:
         """Whether one value names several things, so that a second value would not be taken for the only one."""
         return self.metavar in ("LEGS", "LINKS", "JOINTS")
 
+    def typed(self, value: Any) -> list[str]:
+        """The words of the command line that give a value; none for the default and what stands for none."""
+        if value in (None, "", (), [], self.default):
+            return []
+        if self.kind is bool:
+            return [self.names[0].partition("/")[0]] if value else []
+        each = value if self.several and not isinstance(value, str) else [value]
+        return [word for part in each for word in (self.names[0], as_typed(part))]
+
     def read(self, text: str) -> Any:
         """A value as it is written on the command line; raises ``BadRequest``."""
         if self.kind not in (int, float):
@@ -99,6 +108,11 @@ def flag(name: str, help: str, group: str = OWN) -> Option:
 def output(help: str, metavar: str = "FILE", default: Any = None) -> Option:
     """What is written with ``-o``."""
     return Option("output", help, metavar, default=default, flags=("-o", "--output"), group=OUTPUT)
+
+
+def as_typed(value: Any) -> str:
+    """A value as it is typed: several names with commas."""
+    return ",".join(map(str, value)) if isinstance(value, tuple | list) else str(value)
 
 
 def option(help: str, metavar: str | None = None, **more: Any) -> Option:

@@ -95,13 +95,7 @@ def importing(target: str, observe: str | None, yes: bool, view: bool, json: boo
 def repeat_command(source: dict[str, Any], observe: str | None, target: str) -> str:
     """The command line that writes the same file without questions."""
     words = ["hrsynth", "import", source["robot"]]
-    for option in SOURCE[1:]:
-        value = source[option.name]
-        for each in value if isinstance(value, list | tuple) else [value]:
-            if isinstance(each, bool):
-                words += [option.names[0].partition("/")[0]] if each else []
-            elif each not in (None, "", option.default):
-                words += [option.names[0], str(each)]
+    words += [word for option in SOURCE[1:] for word in option.typed(source[option.name])]
     words += ["--observe", observe] if observe else []
     return shlex.join([*words, "--yes", "-o", target])
 

@@ -10,6 +10,7 @@ import numpy as np
 from ...analysis.observed import ObservedRobot
 from ...batch.reach import reach
 from ...errors import HrsynthError
+from ...index import options
 from ...kinematics.configuration import ClosedConfiguration
 from ...tolerances import AS_PRINTED
 from .request import Request
@@ -18,9 +19,9 @@ NONE = {"command": "", "python": ""}
 """Of an answer that no command gives."""
 
 
-def lines(request: Request, name: str, *options: str, watching: bool = True, **given: Any) -> dict[str, str]:
-    """The fields ``command`` and ``python`` of an answer: the question ``name``, with the ``options`` of the command
-    line and the arguments ``given`` in Python; ``watching``: with what is watched."""
+def lines(request: Request, name: str, *more: str, watching: bool = True, **given: Any) -> dict[str, str]:
+    """The fields ``command`` and ``python`` of an answer: the question ``name`` with what is ``given``, and ``more``
+    words of the command line; ``watching``: with what is watched."""
     words = ["hrsynth", name, request.source.robot]
     python = []
     if watching and request.watched:
@@ -44,8 +45,10 @@ def lines(request: Request, name: str, *options: str, watching: bool = True, **g
             f"{option}={list(value) if isinstance(value, tuple) else value!r}" for option, value in said.items()
         )
         robot = f"hrsynth.load({robot}, {values})"
+    declared = {each.name: each for each in options(name)} if given else {}
+    words += [word for each, value in given.items() for word in declared[each].typed(value)]
     python += [f"{each}={value!r}" for each, value in given.items()]
-    return {"command": shlex.join([*words, *options]), "python": f"hrsynth.{name}({', '.join([robot, *python])})"}
+    return {"command": shlex.join([*words, *more]), "python": f"hrsynth.{name}({', '.join([robot, *python])})"}
 
 
 def at_pose(setting: ObservedRobot, at: ClosedConfiguration) -> str:
@@ -73,7 +76,7 @@ def same_at(setting: ObservedRobot, *at: ClosedConfiguration) -> bool:
 def lines_at(request: Request, name: str, setting: ObservedRobot, here: ClosedConfiguration) -> dict[str, str]:
     """The lines of a question that is asked at a configuration, none where no command is at it."""
     pose = at_pose(setting, here)
-    return lines(request, name, "--at", pose, at=pose) if same_at(setting, here) else NONE
+    return lines(request, name, at=pose) if same_at(setting, here) else NONE
 
 
 def digits(value: float) -> str:

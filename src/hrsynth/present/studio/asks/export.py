@@ -35,7 +35,7 @@ def _page(request: Request) -> tuple[str, bytes, dict[str, str]]:
     found = view(request.seeing(), hidden=True)
     (each,) = OUTPUTS["view"].files
     name = found.setting.robot.name
-    same = lines(request, "view", "--hidden", "--static", f"{name}.html", hidden=True)
+    same = lines(request, "view", "--static", f"{name}.html", hidden=True)
     return name, _bytes(each.content(found, ".html", {})[0]), same
 
 

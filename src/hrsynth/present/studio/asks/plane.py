@@ -77,9 +77,9 @@ def answer(request: Request) -> dict[str, Any]:
     if grid is not None and (known or same_at(setting, here.real)):
         text = grid_text(grid)
         same = (
-            lines(request, "accuracy", "--cone", CONE_TEXT, "--grid", text, cone=CONE_TEXT, grid=text)
+            lines(request, "accuracy", cone=CONE_TEXT, grid=text)
             if kind == ACCURACY
-            else lines(request, "check", "--grid", text, grid=text)
+            else lines(request, "check", grid=text)
         )
     place = _placer(mover, pair, values)
     (a, b), (c, d) = (map(float, ends) for ends in ranges)

@@ -46,7 +46,7 @@ def answer(request: Request) -> dict[str, Any]:
         for i, posed in zip(chosen, way, strict=False)
     ]
     poses = [at_pose(setting, each.real) for each in (start, end)]
-    same = lines(request, "servo", "--start", poses[0], "--goal", poses[1], start=poses[0], goal=poses[1])
+    same = lines(request, "servo", start=poses[0], goal=poses[1])
     return {
         "frames": frames,
         "desired": image(eye, reference, rods, end.real.pose),
