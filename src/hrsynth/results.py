@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields, is_dataclass, replace
 from functools import wraps
@@ -113,6 +114,24 @@ class Result(Compared):
     def headline(self) -> str:
         """What is said in one line."""
         raise NotImplementedError
+
+    def text(self) -> str:
+        """What the command prints, where ``present/outputs.py`` does not say it."""
+        return self.headline()
+
+    def plot(self, axes: Any) -> None:
+        """Draw the answer on the axes of a figure, where ``present/outputs.py`` does not say how."""
+
+    def rows(self) -> Iterable[Iterable[Any]]:
+        """The answer's rows, their heads first, where ``present/outputs.py`` does not say how."""
+        return ()
+
+    @staticmethod
+    def answer_of(name: str) -> type[Result]:
+        """The class of a public function's answers."""
+        function = Result.public(name)
+        found: type[Result] = vars(sys.modules[function.__module__])[function.__annotations__["return"]]
+        return found
 
     def require_answered(self, **asked: Any) -> None:
         """Raise what ends the command with another status, where not all that was ``asked`` has an answer."""

@@ -18,7 +18,7 @@ from hrsynth.cli import app, execute
 from hrsynth.cli.options import JSON, SOURCE
 from hrsynth.cli.questions import FIGURE, QUESTIONS
 from hrsynth.errors import BadRequest
-from hrsynth.present.outputs import OUTPUTS, function
+from hrsynth.present.outputs import OUTPUTS, function, outputs_of
 from hrsynth.results import Result
 
 GOAL, OTHER = "x=0.05,y=0.3", "x=0.06,y=0.3"
@@ -175,3 +175,37 @@ def test_what_has_no_picture_is_refused():
             hrsynth.draw(found)
     with pytest.raises(BadRequest, match="plane"):
         hrsynth.draw(answer("modes"), plane="z=0")
+
+
+class Reach(Result):
+    """An answer that says, draws and writes itself."""
+
+    shown_as = "reach"
+
+    def headline(self) -> str:
+        return "reach: 1 m"
+
+    def text(self) -> str:
+        return "reaches\n1 m"
+
+    def plot(self, axes) -> None:
+        axes.plot([0, 1], [0, 1])
+
+    def rows(self):
+        return [("x", "y"), (0, 1.5)]
+
+
+def reach(robot) -> Reach:
+    return Reach()
+
+
+def test_an_answer_may_say_draw_and_write_itself(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    """As a new question does that is declared in one module."""
+    public = Result.public
+    monkeypatch.setattr(Result, "public", staticmethod(lambda name: reach if name == "reach" else public(name)))
+    (file,) = outputs_of("reach").files
+    assert hrsynth.text(Reach()) == "reaches\n1 m"
+    assert hrsynth.draw(Reach()).content.startswith(b"\x89PNG")
+    hrsynth.draw(Reach(), tmp_path / "reach.pdf")
+    assert (tmp_path / "reach.pdf").read_bytes().startswith(b"%PDF")
+    assert file.content(Reach(), ".csv", {}) == (b"x,y\n0,1.5\n", {})

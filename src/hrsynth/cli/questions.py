@@ -9,7 +9,7 @@ from typing import Any
 
 from ..index import analyses, options
 from ..options import OUTPUT, Option, output
-from ..present.outputs import OUTPUTS, File
+from ..present.outputs import File, outputs_of
 from ..progress import following
 from .colour import paint, say
 from .commands import Group, add_command
@@ -32,7 +32,7 @@ class Question:
     def add(self, app: Group) -> None:
         """Make it a command."""
         declared = analyses()[self.name]
-        files = OUTPUTS[self.name].files
+        files = outputs_of(self.name).files
         own = [each for each in options(self.name) if each.name != "seed"]
         own += [each for file in files for each in file.asks]
         own += [_file_option(each) for each in files if each.option is not None]
@@ -48,7 +48,7 @@ class Question:
         from ..description.files import require_other
         from ..present.show import record, text
 
-        files = {each: values.pop(each.option) for each in OUTPUTS[self.name].files if each.option is not None}
+        files = {each: values.pop(each.option) for each in outputs_of(self.name).files if each.option is not None}
         for each, path in files.items():
             each.require(path, values)
         if self.needs is not None and not json and not any(files.values()):

@@ -12,7 +12,7 @@ import hrsynth
 
 from .. import records
 from ..options import NEEDED, Option
-from ..present.outputs import OUTPUTS, File, function
+from ..present.outputs import File, function, outputs_of
 from ..records import Head, OfRobot, object_schema, summary
 from .app import app
 from .colour import say
@@ -35,7 +35,7 @@ def schema(command: str) -> dict[str, Any]:
     if kind is not None:
         head = object_schema([kind], parts)
     else:
-        kind, files = _answer(getattr(hrsynth, command)), OUTPUTS[command].files
+        kind, files = _answer(getattr(hrsynth, command)), outputs_of(command).files
         of_robot = "robot" in signature(getattr(hrsynth, command)).parameters
         head = object_schema([OfRobot if of_robot else Head, kind], parts)
     fields = {file.field: str | None for file in files if file.option is not None and file.field is not None}

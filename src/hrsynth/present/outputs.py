@@ -7,6 +7,8 @@ when it is wanted.
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -16,6 +18,7 @@ from typing import Any
 
 from ..errors import BadRequest
 from ..options import Option
+from ..results import Result
 
 Content = bytes | Iterable[bytes]
 Asked = Mapping[str, Any]
@@ -24,8 +27,10 @@ PNG, CSV, HTML = ".png", ".csv", (".html", ".htm")
 FIGURES = (PNG, ".pdf", ".svg")
 
 
-def function(name: str) -> Callable[..., Any]:
-    """The function ``module:function`` of this folder, ``.module:function`` of the package."""
+def function(name: str | Callable[..., Any]) -> Callable[..., Any]:
+    """The function ``module:function`` of this folder, ``.module:function`` of the package, or one as it is."""
+    if callable(name):
+        return name
     module, _, attribute = name.partition(":")
     found: Callable[..., Any] = getattr(import_module(f".{module}", __package__), attribute)
     return found
@@ -42,7 +47,7 @@ class File:
     """
 
     refusal: str
-    makers: Mapping[str, str]
+    makers: Mapping[str, str | Callable[..., Any]]
     holds: str = ""
     """What it holds: the subject of the sentence that tells where it is written."""
     help: str = ""
@@ -199,7 +204,7 @@ class Outputs:
     """What there is of one kind of answer: ``text`` is called with it, ``inline`` makes HTML for a notebook, where that
     is more than the text."""
 
-    text: str
+    text: str | Callable[..., str]
     files: tuple[File, ...] = ()
     inline: str | None = None
 
@@ -392,3 +397,25 @@ OUTPUTS = {
 }
 """The outputs by the name under which a result is shown (:attr:`hrsynth.results.Result.shown_as`): that of its
 command, or of its kind where it is a part of an answer."""
+
+
+def outputs_of(name: str) -> Outputs:
+    """The outputs of a kind of answer: those of the table, else what its class draws and writes itself."""
+    if name in OUTPUTS:
+        return OUTPUTS[name]
+    kind = Result.answer_of(name)
+    makers: dict[str, str | Callable[..., Any]] = {}
+    if kind.plot is not Result.plot:
+        makers |= dict.fromkeys(FIGURES, "plots:drawn_by")
+    if kind.rows is not Result.rows:
+        makers[CSV] = _csv
+    help = f"Write {name}{', '.join(makers)}."
+    file = File(f"cannot write the answer of {name}", makers, f"The answer of {name}", help, drawn=PNG in makers)
+    return Outputs(kind.text, (file,) if makers else ())
+
+
+def _csv(found: Result) -> bytes:
+    """The rows of an answer as comma-separated values."""
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\n").writerows(found.rows())
+    return stream.getvalue().encode()

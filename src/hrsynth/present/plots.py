@@ -16,7 +16,8 @@ from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.platform_motion import PlatformMotion
 from ..mechanism.pose import Pose
-from .paper import BESIDE, PNG, Paper, legend_within
+from ..results import Result
+from .paper import BESIDE, PNG, Paper, legend_within, print_figure
 from .skeleton import legs_of, outline
 from .sketch import Sketch, axis_label
 from .view.view import plane_normal
@@ -26,6 +27,8 @@ STYLE = "hrsynth.present.style"
 PAD = 0.07
 """Left free about axes, titles and legends (inches)."""
 FEWEST_TICKS = 3
+OWN_WIDTH, OWN_HEIGHT = 4.5, 3.5
+"""A figure that an answer draws itself (inches)."""
 PLACES = 6
 """Decimals of metres and degrees in words."""
 Asked = ParamSpec("Asked")
@@ -298,3 +301,11 @@ def legend(figure: Any, entries: Sequence[Any], paper: Paper) -> None:
     else:
         tall = legend_within(figure, list(entries), wide, loc="outside lower center")
         figure.set_figheight(figure.get_figheight() + tall)
+
+
+@in_style
+def drawn_by(found: Result, paper: Paper = PNG) -> bytes:
+    """The figure that an answer draws itself."""
+    figure = empty_figure(paper.wide(OWN_WIDTH), OWN_HEIGHT)
+    found.plot(figure.add_subplot())
+    return print_figure(figure, paper)

@@ -16,7 +16,7 @@ from ..errors import BadRequest, MissingExtra
 from ..options import require_range
 from ..results import Result, with_spelling
 from ..version import __version__
-from .outputs import FIGURES, OUTPUTS, File, function
+from .outputs import FIGURES, OUTPUTS, File, function, outputs_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -63,7 +63,7 @@ def text(result: Result) -> str:
     >>> print(hrsynth.text(hrsynth.legs("rrrrr_m1")).splitlines()[0])
     rrrrr_m1   R*RRRR*   2 dof
     """
-    shown: str = function(OUTPUTS[result.shown_as].text)(result)
+    shown: str = function(outputs_of(result.shown_as).text)(result)
     return shown
 
 
@@ -92,7 +92,7 @@ def html(result: Result) -> str:
     >>> hrsynth.html(hrsynth.derive("3rrr_m1"))[:4]
     '<pre'
     """
-    said, inline = text(result), OUTPUTS[result.shown_as].inline
+    said, inline = text(result), outputs_of(result.shown_as).inline
     if inline is not None:
         try:
             return str(function(inline)(result))
@@ -127,7 +127,7 @@ def draw(
     asked = {"plane": plane, "steps": steps, "seed": 0, "width": width, "font": font}
     if not isinstance(result, Result):
         raise BadRequest("a picture of", repr(result), "what a function of hrsynth answers")
-    for drawn in OUTPUTS[result.shown_as].files:
+    for drawn in outputs_of(result.shown_as).files:
         endings = tuple(each for each in PICTURES if each in drawn.makers)
         if not endings or (drawn.part is not None and getattr(result, drawn.part) is None):
             continue
