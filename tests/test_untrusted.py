@@ -685,9 +685,11 @@ PROGRAMS = {
     "GENERATED ALWAYS AS (printf('%.*c', 9000, 'x'))); INSERT INTO lines VALUES (0)",
     "a trigger": "CREATE TRIGGER t AFTER INSERT ON lines BEGIN DELETE FROM lines; END",
     "a virtual table": "CREATE VIRTUAL TABLE t USING fts5(x)",
-    "a far row": "UPDATE lines SET record = 1999999999",
+    "a far row": "UPDATE groups SET count = 2000000000; UPDATE lines SET record = 1999999999",
     "a far record": "UPDATE records SET record = 9000000000000000000",
-    "no name": "UPDATE records SET \"group\" = x'00'",
+    "a large count": "UPDATE groups SET count = 10000000000000",
+    "no number": "UPDATE groups SET count = 9e999",
+    "no name": "UPDATE groups SET name = x'00'",
     "a log": "PRAGMA journal_mode = WAL",
 }
 

@@ -340,7 +340,7 @@ PARTS_AHEAD = 3
 MOST_RECORDS = 1_000_000
 """Lines of a compressed file of the catalog."""
 LARGEST_RECORD = 100_000
-"""Characters of a line of the catalog, of a text in a SQLite file, and of the values of a field there together."""
+"""Characters of a line of the catalog, and of a text in a SQLite file."""
 LARGEST_CATALOG = 100_000_000
 """Bytes of the lines of a catalog that are read, unpacked, those of its groups together."""
 MOST_READ_PARTS = 7_000_000

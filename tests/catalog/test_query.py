@@ -200,7 +200,8 @@ def test_values_of_a_field_are_those_of_all_records(name: str, stores: tuple[Pat
         "DELETE FROM lines",
         "UPDATE lines SET line = x'00'",
         "UPDATE lines SET line = 'no record'",
-        """UPDATE records SET "group" = 3 WHERE "group" = 'd'""",
+        "UPDATE groups SET name = 3 WHERE name = 'd'",
+        "DELETE FROM groups WHERE name = 'd'",
     ],
 )
 def test_a_file_whose_tables_are_spoilt_is_told(change: str, stores: tuple[Path, Path], tmp_path: Path, capsys):

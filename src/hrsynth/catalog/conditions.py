@@ -86,7 +86,7 @@ def _folded(text: str) -> bytes | None:
 
 
 CONDITIONS: Mapping[str, RecordCondition] = {
-    "group": RecordCondition('+"group" = {0}', _same),
+    "group": RecordCondition('"group" = {0}', _same),
     "dof": RecordCondition("dof = {0}", _same),
     "motion": RecordCondition("motion = {0}", _same),
     "verdict": RecordCondition("verdict = {0}", _same),
@@ -102,8 +102,7 @@ CONDITIONS: Mapping[str, RecordCondition] = {
         "(said IN (SELECT said FROM texts WHERE instr(text, {0})) OR instr(lower(word), {0}))", _folded
     ),
 }
-"""What can be asked for. With its ``+`` a group is not looked up in the index, which is for names and counts of groups:
-most records are of one group, and are not there in order."""
+"""What can be asked for."""
 LEG_PATTERN = RecordCondition(
     """(word GLOB {0} OR replace(word, '*', '') GLOB {0}
         OR notation IN (SELECT notation FROM chains WHERE chain GLOB {0}))""",

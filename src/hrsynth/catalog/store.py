@@ -142,7 +142,7 @@ class Database:
         self.path = path
 
     def groups(self) -> list[str]:
-        found = self._column('SELECT DISTINCT "group" FROM records ORDER BY 1')
+        found = self._column("SELECT name FROM groups ORDER BY name")
         if not all(isinstance(name, str) for name in found):
             raise BadRequest(f"{self.path}: not a catalog file: a group without a name")
         return found
@@ -151,15 +151,13 @@ class Database:
         question = RecordQuestion.of({**asked, "group": tuple(groups)})
         with _refusing_sqlite_errors(self.path):
             file = self._open()
-            counted = (
-                "(SELECT count(*) FROM records), (SELECT max(record) FROM records), (SELECT max(record) FROM lines)"
-            )
-            if len(set(file.execute(f"SELECT {counted}").fetchone())) > 1:
+            counted = "sum(count), (SELECT max(record) FROM records), (SELECT max(record) FROM lines)"
+            if len(set(file.execute(f"SELECT {counted} FROM groups").fetchone())) > 1:
                 raise BadRequest(f"{self.path}: not a catalog file: its records and its lines differ in number")
             return StoredLines(self.path, file, question.rows(file))
 
     def count(self, group: str) -> int:
-        return int(self._column('SELECT count(*) FROM records WHERE "group" = ?', group)[0])
+        return sum(self._column("SELECT count FROM groups WHERE name = ?", group))
 
     def values(self, name: str) -> list[Any]:
         found = self._column(
@@ -301,7 +299,8 @@ def write_tables(path: Path, groups: Mapping[str, Iterable[str]]) -> None:
         file.execute("CREATE TABLE versions (format INTEGER, catalog INTEGER)")
         file.execute("INSERT INTO versions VALUES (?, ?)", (TABLES, VERSION))
         fill(file, lines)
-        file.execute('CREATE INDEX by_group ON records ("group")')
+        file.execute("CREATE TABLE groups (name, count)")
+        file.execute('INSERT INTO groups SELECT "group", count(*) FROM records GROUP BY 1')
         file.execute("CREATE TABLE lines (record INTEGER PRIMARY KEY, line TEXT)")
         file.executemany("INSERT INTO lines (line) VALUES (?)", zip(lines, strict=True))
         file.commit()
