@@ -20,7 +20,8 @@ class Kept {
   /* The slider that was moved goes on alone: all others go home. */
   move({ values, here }) {
     const { sliders, state } = this.record, moved = values ? values.findIndex((value, i) => value !== this.values[i]) : -1;
-    const at = moved < 0 ? here : { slider: moved, value: sliders[moved].values.indexOf(values[moved]) };
+    const gone = moved >= 0 && { slider: moved, value: sliders[moved].values.indexOf(values[moved]) };
+    const at = moved < 0 ? here : values[moved] === sliders[moved].home ? null : gone;
     this.values = sliders.map((slider, i) => at?.slider === i ? slider.values[at.value] : slider.home);
     return { state: at ? sliders[at.slider].states[at.value] : state, here: at, values: this.values, stopped: false };
   }

@@ -27,11 +27,20 @@ class ModesPanel extends Panel {
     if (this.studio.isShown(this.key)) this.entered();
   }
 
+  /* A page that was saved knows those of home, and shows them there. */
+  moved({ here }) {
+    if (!this.kept) return;
+    this.words.textContent = here ? "They are shown at home." : "";
+    this.studio.stage.ghosts(here ? [] : this.outlines);
+    this.studio.relegend();
+  }
+
   /* Other poses from here are other modes: those that are listed belong to where they were asked. */
   settled() {
+    if (this.kept) return;
     const away = (values) => values?.some((value, i) => Math.abs(value - this.studio.values[i]) > 1e-6);
     if (this.flown) this.flown.to ??= this.studio.values;
-    if (this.flown ? away(this.flown.to) : away(this.origin)) this.words.textContent = this.kept ? "These belong to the pose at home." : "These belong to an earlier pose. Find them again.";
+    if (this.flown ? away(this.flown.to) : away(this.origin)) this.words.textContent = "These belong to an earlier pose. Find them again.";
   }
 
   forget() {
