@@ -2,8 +2,8 @@
 
 A member of a record is
 
-* a field of a dataclass that is annotated with more than its type: ``Annotated[float, As("time_s"), "when it ended"]``.
-  Of what stands behind the type, a text says what it is, :class:`As` how it is told, and anything else is its type in
+* a field of a dataclass that is :data:`Recorded` or annotated with more than its type:
+  ``Annotated[float, As("time_s"), "when it ended"]``. Of what stands behind the type, a text says what it is, :class:`As` how it is told, and anything else is its type in
   JSON where that differs: ``Annotated[Array, list[float], "low ends (m, rad)"]``;
 * a property under :func:`recorded`;
 * :class:`Shown`, a value that only the record has.
@@ -50,6 +50,9 @@ Word = Literal["controllable", "partially controllable", "uncontrollable", "noth
 MM, DEG = 1e3, degrees(1.0)
 """Scales of what is told in millimetres or degrees."""
 F = TypeVar("F", bound=Callable[..., Any])
+T = TypeVar("T")
+Recorded = Annotated[T, ""]
+"""A field that is told under its name and with its type, of which no more is said."""
 
 
 @dataclass(frozen=True)
@@ -198,7 +201,9 @@ def members(kind: type) -> tuple[Member, ...]:
     for base in reversed(kind.__mro__):
         known = vars(base).get("__annotations__", {})
         named = issubclass(base, tuple) or vars(base).get("all_recorded", False)
-        told = {name: hint for name, hint in known.items() if named or str(hint).startswith("Annotated[")}
+        told = {
+            name: hint for name, hint in known.items() if named or str(hint).startswith(("Annotated[", "Recorded["))
+        }
         place = vars(sys.modules[base.__module__])
         hints = get_type_hints(SimpleNamespace(__annotations__=told), place, include_extras=True)
         found |= {name: _member(name, hint) for name, hint in hints.items()}

@@ -21,7 +21,7 @@ from ..mechanism.observations import kinds
 from ..mechanism.sensors import encoders, observation_of, observed_line
 from ..options import WATCHING, option, plain_number
 from ..progress import tell
-from ..records import FLAT, GAP, OPTIONAL, As, Shown, Word, recorded
+from ..records import FLAT, GAP, OPTIONAL, As, Recorded, Shown, Word, recorded
 from ..results import Result, Value
 from ..tolerances import RANK_CUTOFF, SAME_PRICE, SAME_RELATION
 from .freedoms import Freedom
@@ -171,9 +171,9 @@ BATCH = 2000
 class Cure(Value):
     """A set of measurements, and the verdict with them at all samples."""
 
-    measurements: Annotated[tuple[FurtherMeasurement, ...], ""]
+    measurements: Recorded[tuple[FurtherMeasurement, ...]]
     verdict: Verdict
-    price: Annotated[float, ""]
+    price: Recorded[float]
     """Of all of them together; each is 1 where nothing else is said."""
 
     verdict_record = Shown(Word, lambda self: self.verdict.verdict, As("verdict"))
@@ -189,11 +189,11 @@ class Advice(Result, shown_as="advise"):
 
     setting: Annotated[ObservedRobot, FLAT]
     now: Verdict
-    sets: Annotated[tuple[Cure, ...], ""]
-    tried: Annotated[int, ""]
-    complete: Annotated[bool, ""]
+    sets: Recorded[tuple[Cure, ...]]
+    tried: Recorded[int]
+    complete: Recorded[bool]
     """Whether every set of this size and of all smaller ones was tried, and none was left undecided."""
-    undecided: Annotated[int, ""] = 0
+    undecided: Recorded[int] = 0
     """Sets that were promising at the probes, but whose rank has no clear gap at the samples."""
 
     @property

@@ -14,7 +14,7 @@ from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism.pose import Grid, PoseLike, asked_poses
 from ..options import option
 from ..progress import tell
-from ..records import FLAT, As, Shown, Table, recorded
+from ..records import FLAT, As, Recorded, Shown, Table, recorded
 from ..results import Result, Value
 from ..tolerances import RANK_GAP
 from .asked import asked_at, require_platform
@@ -46,7 +46,7 @@ class GridCheck(Value):
 
     grid: Annotated[Grid, FLAT]
     postures: tuple[Posture | None, ...]
-    free: Annotated[tuple[str, ...], ""]
+    free: Recorded[tuple[str, ...]]
     """The parts of the pose that are neither varied nor held."""
     dependent: str | None = None
     """That parts of its poses depend on each other, where some are not reached."""
@@ -88,8 +88,8 @@ class Check(Result, shown_as="check"):
 
     setting: Annotated[ObservedRobot, FLAT]
     postures: Annotated[tuple[Posture, ...], As("configurations")]
-    redundant: Annotated[tuple[Redundancy, ...], ""]
-    grid: Annotated[GridCheck | None, ""] = None
+    redundant: Recorded[tuple[Redundancy, ...]]
+    grid: Recorded[GridCheck | None] = None
     unreached: tuple[PoseNotReached, ...] = ()
     """The poses asked for that the robot does not reach, and why."""
 

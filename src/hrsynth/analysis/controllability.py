@@ -12,7 +12,7 @@ from ..kinematics.sampling import Samples
 from ..mechanism.observation import labels_of
 from ..mechanism.pose import asked_pose
 from ..progress import tell
-from ..records import FLAT, As, Shown, recorded
+from ..records import FLAT, As, Recorded, Shown, recorded
 from ..results import Result
 from .asked import observe as observed
 from .exact import ExactVerdict, architecture
@@ -56,17 +56,17 @@ class Legs(Result, shown_as="legs"):
     """The verdict of every set of observed legs, and the smallest sets of the best rank."""
 
     setting: ObservedRobot
-    robot: Annotated[str, ""]
+    robot: Recorded[str]
     architecture: Annotated[str, As("architecture_ascii")]
-    dof: Annotated[int, ""]
+    dof: Recorded[int]
     sets: tuple[Verdict, ...]
     exact: tuple[ExactVerdict, ...]
     """What generic geometry of the same architecture sees, for each of ``sets``."""
-    complete: Annotated[bool, ""]
+    complete: Recorded[bool]
     """Whether all sets are listed."""
-    minimal: Annotated[tuple[tuple[str, ...], ...], ""] = field(default=())
+    minimal: Recorded[tuple[tuple[str, ...], ...]] = field(default=())
     """The smallest sets of the best rank; none where that is 0, as in the catalog."""
-    minimal_complete: Annotated[bool, ""] = True
+    minimal_complete: Recorded[bool] = True
     """Whether ``minimal`` has all smallest sets; else it has one of which none can be left out."""
     where: str = "the zero configuration"
     """What took the place of the zero configuration, as it was asked for."""

@@ -21,7 +21,7 @@ from ..mechanism.notation import Architecture
 from ..mechanism.observations.direction import Direction
 from ..options import option
 from ..progress import tell
-from ..records import ANGLE, FLAT, As, Shown, recorded
+from ..records import ANGLE, FLAT, As, Recorded, Shown, recorded
 from ..results import Result, Value
 from ..rewrite.evidence import Evidence
 from ..rewrite.state import State
@@ -61,11 +61,11 @@ class UncheckedForm(Value):
     """The architecture of unchecked rules, whether it is equivalent, and the freedoms that it gains or loses."""
 
     hidden: Architecture
-    equivalent: Annotated[bool, ""]
+    equivalent: Recorded[bool]
     largest_angle: Annotated[float, ANGLE]
-    gains: Annotated[tuple[Freedom, ...], ""] = ()
-    loses: Annotated[tuple[Freedom, ...], ""] = ()
-    reason: Annotated[str, ""] = ""
+    gains: Recorded[tuple[Freedom, ...]] = ()
+    loses: Recorded[tuple[Freedom, ...]] = ()
+    reason: Recorded[str] = ""
 
     hidden_ascii = Shown(str, lambda self: self.hidden.ascii)
 
@@ -95,7 +95,7 @@ class Derivation(Result, shown_as="derive"):
     """What generic geometry of the same architecture sees."""
     taken: tuple[Step, ...]
     """All attempts; those of the observed legs were compared with the real robot all together."""
-    certificate: Annotated[Certificate, ""]
+    certificate: Recorded[Certificate]
     unchecked: Annotated[UncheckedForm | None, As("unchecked_form")]
 
     @cached_property

@@ -37,7 +37,7 @@ from ..mechanism.model import JointType
 from ..mechanism.observation import labels_of
 from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.relations import Relations, recognise
-from ..records import OPTIONAL, As, Record, Word
+from ..records import OPTIONAL, As, Record, Recorded, Word
 from ..results import Compared, finite
 from ..tolerances import CLOSED
 from .formation import PLACES, following, sense_links
@@ -59,9 +59,9 @@ class Basis(Record):
     """What the relations of an architecture rest on: how many are ``carried`` by links and joints, how many closed
     loops keep besides, and those merely ``observed``, in words."""
 
-    carried: Annotated[int, ""]
-    kept: Annotated[int, ""]
-    observed: Annotated[tuple[str, ...], ""]
+    carried: Recorded[int]
+    kept: Recorded[int]
+    observed: Recorded[tuple[str, ...]]
     held: Annotated[float, As("largest_defect_held")] = 0.0
     """The largest defect (sines, characteristic lengths) of a relation that counts as held."""
     missed: Annotated[float | None, As("smallest_defect_not_held")] = None
@@ -85,13 +85,13 @@ class ExactVerdict(Compared):
 
     legs: tuple[str, ...]
     verdict: Annotated[str | None, Word | None]
-    rank: Annotated[int | None, ""]
+    rank: Recorded[int | None]
     dof: int
-    exact: Annotated[bool, ""]
-    instances: Annotated[int, ""]
-    reason: Annotated[str, ""]
-    proved: Annotated[bool, ""] = False
-    chance: Annotated[float, ""] = 0.0
+    exact: Recorded[bool]
+    instances: Recorded[int]
+    reason: Recorded[str]
+    proved: Recorded[bool] = False
+    chance: Recorded[float] = 0.0
     basis: Annotated[Basis | None, As("relations")] = None
     trivial: Annotated[int | None, int, OPTIONAL, "of a formation: how many unseen motions are trivial"] = None
     """Of a formation: how many independent unseen motions are trivial."""

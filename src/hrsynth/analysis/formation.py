@@ -24,6 +24,7 @@ from ..mechanism import Observation
 from ..mechanism.legs import LegDecomposition
 from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.sights import CameraObservation, Sighting
+from ..records import Recorded
 from ..results import Value
 from ..tolerances import NAMED
 from .freedoms import direction_name, directions_in, point_text
@@ -147,9 +148,9 @@ class Formation(Value):
     """What observations do not see of a formation at a configuration: trivial motions by name, and flexes; ``special``
     is the line or plane in which all points lie here that are sensed, and generically do not."""
 
-    bodies: Annotated[tuple[str, ...], ""]
-    trivial: Annotated[tuple[str, ...], ""]
-    flexes: Annotated[tuple[Flex, ...], ""]
+    bodies: Recorded[tuple[str, ...]]
+    trivial: Recorded[tuple[str, ...]]
+    flexes: Recorded[tuple[Flex, ...]]
     special: Annotated[str, "the line or plane that holds all sensed points here, but not generically"] = ""
     group: Similarities | None = None
     """All that the trivial motions make of what is sensed, where that is told by turns and scales about one place."""

@@ -32,7 +32,7 @@ from ..mechanism.pose import RADIANS, ModeNumber, Pose, PoseForm, PoseLike
 from ..mechanism.sensors import default_observation, defaults_of, encoders, observation_of, reason
 from ..options import WATCHING, option
 from ..progress import tell
-from ..records import As, Record, Shown
+from ..records import As, Record, Recorded, Shown
 from ..results import Value, content
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ class ObservedRobot(Value):
     robot: Mechanism
     normal: NormalForm
     anatomy: LegDecomposition
-    observed: Annotated[tuple[Observation, ...], ""]
+    observed: Recorded[tuple[Observation, ...]]
     everything: Samples
     """Samples for the question of all default segments, and besides of the observed ones and those the file names."""
     defaults: int

@@ -14,7 +14,7 @@ from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.limits import flat_wrists, outside
 from ..kinematics.relation import Relation, relation, relation_of
 from ..mechanism.pose import Pose
-from ..records import OPTIONAL, As, Number, Record, Shown, recorded
+from ..records import OPTIONAL, As, Number, Record, Recorded, Shown, recorded
 from ..results import Value
 from ..tolerances import PASSED_BY, RANK_GAP
 from .classes import (
@@ -94,16 +94,16 @@ class Posture(Value):
     """All that is said of one configuration."""
 
     configuration: ClosedConfiguration
-    pose: Annotated[Pose, ""]
-    mobility: Annotated[Mobility, ""]
-    dof: Annotated[int, ""]
+    pose: Recorded[Pose]
+    mobility: Recorded[Mobility]
+    dof: Recorded[int]
     hidden: Annotated[Kinds, As(flat=True, without=("rank",))]
     real: Annotated[Kinds | None, "what the motors determine"]
     """The real robot with its own motors; None where it has none."""
-    distances: Annotated[Distances, ""]
+    distances: Recorded[Distances]
     gained: tuple[Freedom, ...] = ()
     """At a constraint singularity: the freedoms that the platform has here and not in general."""
-    redundant: Annotated[tuple[Redundancy, ...], ""] = ()
+    redundant: Recorded[tuple[Redundancy, ...]] = ()
     """Loop constraints that are redundant only here."""
     formation: Annotated[Formation | None, Formation, OPTIONAL] = None
     """Of a formation: what is not seen here; ``pose`` is that of its first body."""

@@ -10,7 +10,7 @@ from ..errors import RankUndecided
 from ..geometry.ranks import Rank
 from ..kinematics.relation import Relation, look, relation
 from ..kinematics.sampling import Samples
-from ..records import GAP, OPTIONAL, Shown, Word, recorded
+from ..records import GAP, OPTIONAL, Recorded, Shown, Word, recorded
 from ..results import Result
 from ..tolerances import RANK_CUTOFF, RANK_GAP, SURELY_SOMETHING, SURELY_ZERO
 from .formation import Formation, formation_at
@@ -43,13 +43,13 @@ class Margin(NamedTuple):
 class Verdict(Result, shown_as="verdict"):
     """What one set of observed legs sees of the platform, at generic configurations."""
 
-    legs: Annotated[tuple[str, ...], ""]
+    legs: Recorded[tuple[str, ...]]
     verdict: Annotated[str, Word]
     dof: int
-    rank: Annotated[int, ""]
-    lost: Annotated[tuple[Freedom, ...], ""]
+    rank: Recorded[int]
+    lost: Recorded[tuple[Freedom, ...]]
     gap: Annotated[float, GAP]
-    has_interaction_matrix: Annotated[bool, ""] = True
+    has_interaction_matrix: Recorded[bool] = True
     """Whether Mᵀ exists: no observed direction moves while the platform rests."""
     counted: float = 1.0
     """The smallest singular value of the measured rates on ρ that counts as seen, at the sample where it is largest:

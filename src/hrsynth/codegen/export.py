@@ -17,7 +17,7 @@ from ..geometry.vectors import Array
 from ..mechanism.observations.direction import Direction
 from ..options import option
 from ..progress import tell
-from ..records import Shown, Table, recorded
+from ..records import Recorded, Shown, Table, recorded
 from ..results import Result
 from ..tolerances import GENERATED_CLOSED, GENERATED_LAST_STEP
 from .inverse import closed_inverse
@@ -48,15 +48,15 @@ class ExportedCode(Result, shown_as="export"):
 
     proof: BranchProof
     lang: Annotated[str, Literal["c++", "numpy"]]
-    legs: Annotated[tuple[str, ...], ""]
+    legs: Recorded[tuple[str, ...]]
     closed: bool
     """Whether the motors of a pose are found in closed form."""
     bounds: ProvedBounds | None
     """Newton's steps that are enough, and how far an answer is off at most (proved); None where a cell has no bound."""
-    cells: Annotated[int, ""]
+    cells: Recorded[int]
     """How many cells the program holds."""
     code: str
-    free: Annotated[tuple[FreeMotor, ...], ""] = ()
+    free: Recorded[tuple[FreeMotor, ...]] = ()
     """Motors in no loop, with the interval (m, rad) in which the program answers."""
 
     @property

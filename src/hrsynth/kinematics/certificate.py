@@ -16,7 +16,7 @@ from ..errors import BadMechanism, NotMeasured
 from ..geometry.ranks import CLEAN, largest_angle, spectra
 from ..geometry.vectors import Array
 from ..mechanism import Mechanism
-from ..records import ANGLE, GAP, Number
+from ..records import ANGLE, GAP, Number, Recorded
 from ..results import Result
 from ..tolerances import FOLLOWED, RANK_GAP, SAME_RELATION, SOLVED
 from .configuration import ClosedConfiguration
@@ -41,13 +41,13 @@ class Certificate(Result, shown_as="certificate"):
     """What was compared: configurations, the largest angle between ρ and ρ_H, the smallest rank gap, the largest
     residual at which the hidden robot follows; ``reason`` says why it did not pass."""
 
-    samples: Annotated[int, ""]
-    discarded: Annotated[int, ""]
+    samples: Recorded[int]
+    discarded: Recorded[int]
     largest_angle: Annotated[float, ANGLE]
     smallest_gap: Annotated[float, Number, GAP]
-    residual: Annotated[float, ""]
-    passed: Annotated[bool, ""]
-    reason: Annotated[str, ""]
+    residual: Recorded[float]
+    passed: Recorded[bool]
+    reason: Recorded[str]
     mismatch: Mismatch | None = None
 
     def headline(self) -> str:

@@ -12,7 +12,7 @@ from ..description import file_of
 from ..description.files import require_writable, write_whole
 from ..description.overrides import Overrides, names
 from ..errors import BadRequest, BadRobotFile, Defect
-from ..records import As, Shown, recorded
+from ..records import As, Recorded, Shown, recorded
 from ..results import Result, require_keywords
 from .findings import SEVERITIES, Finding, Mend
 from .rules import lint_rules
@@ -41,8 +41,8 @@ class Lint(Result, shown_as="lint"):
     """What was found in which files, and what was mended and where that is written; ``unread``: why others of several
     files could not be opened."""
 
-    files: Annotated[tuple[str, ...], ""]
-    findings: Annotated[tuple[Finding, ...], ""]
+    files: Recorded[tuple[str, ...]]
+    findings: Recorded[tuple[Finding, ...]]
     mended: Annotated[tuple[Finding, ...], "what --fix did"] = ()
     written: Annotated[str | None, As("file"), "where the result is written"] = None
     rules: tuple[str, ...] = field(default=(), repr=False)

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Protocol
 from ..mechanism import Mechanism
 from ..mechanism.observation import labels_of
 from ..progress import tell
-from ..records import ANGLE, Record
+from ..records import ANGLE, Record, Recorded
 from .evidence import Evidence
 from .rule import Proposal, Refusal, Rule, Stage
 from .rules import rules
@@ -46,10 +46,10 @@ class Step(Record):
     where it keeps ρ at singular configurations too, ``bodies`` the links, besides the platform, whose twists must not
     change, ``taken_back`` whether it served only for a proposal that was not kept."""
 
-    rule: Annotated[str, ""]
-    leg: Annotated[str | None, ""]
-    accepted: Annotated[bool, ""]
-    reason: Annotated[str, ""]
+    rule: Recorded[str]
+    leg: Recorded[str | None]
+    accepted: Recorded[bool]
+    reason: Recorded[str]
     largest_angle: Annotated[float | None, ANGLE]
     state: State | None = field(default=None, compare=False, repr=False)
     always: bool = field(default=False, compare=False, repr=False)

@@ -43,7 +43,7 @@ from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.pose import Pose, PoseLike, asked_pose
 from ..options import option, options_of, require_range
 from ..progress import part, tell
-from ..records import DEG, MM, As, Number, Record, Shown, Word, recorded
+from ..records import DEG, MM, As, Number, Record, Recorded, Shown, Word, recorded
 from ..results import Compared, Result, Value, by_name
 from ..simulation.camera import cylinders, place_camera
 from ..simulation.ending import GOAL
@@ -125,9 +125,9 @@ class ModeCount(Record):
     """How many assembly modes, near ones too, there are with the directions of a pose, in how many of them the robot
     was found assembled, and whether these are proved to be all; ``why`` they are not listed, otherwise empty."""
 
-    count: Annotated[int | None, ""]
-    reachable: Annotated[int | None, ""]
-    complete: Annotated[bool, ""]
+    count: Recorded[int | None]
+    reachable: Recorded[int | None]
+    complete: Recorded[bool]
     why: str = ""
 
     @classmethod
@@ -159,18 +159,18 @@ class Candidate(Value):
     """What is known about a set of legs; None for what was not computed, because the set was discarded before or was
     not ``examined``: then it is neither kept nor discarded."""
 
-    legs: Annotated[tuple[str, ...], ""]
+    legs: Recorded[tuple[str, ...]]
     verdict: Annotated[str, Word]
-    discarded: Annotated[str | None, ""] = None
+    discarded: Recorded[str | None] = None
     errors: PoseErrors | None = None
-    seen: Annotated[Mapping[str, float] | None, ""] = None
+    seen: Recorded[Mapping[str, float] | None] = None
     """The least part of each of its legs that the camera sees at start and goal, after a run all along it."""
     start_modes: ModeCount | None = None
     goal_modes: ModeCount | None = None
-    aspect: Annotated[Decision | None, ""] = None
+    aspect: Recorded[Decision | None] = None
     ends: Annotated[LoopEnds | None, As("endings")] = None
-    run: Annotated[Decision | None, ""] = None
-    examined: Annotated[bool, ""] = True
+    run: Recorded[Decision | None] = None
+    examined: Recorded[bool] = True
 
     @property
     def rank(self) -> tuple[float, ...]:

@@ -16,7 +16,7 @@ from ..errors import HrsynthError
 from ..geometry.vectors import Array, pose_difference
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism.observations.direction import SeenAxis
-from ..records import As
+from ..records import As, Recorded
 from ..results import Value
 from ..tolerances import DAMPED, NEAR_MODE, SAME_NEAR_POSE, SAME_RELATION
 from .law import Command, Measures
@@ -33,7 +33,7 @@ class Ending(Value):
     list of all modes of the goal's directions (None if it is none of them, or if they cannot be listed)."""
 
     name: Annotated[str, As("ended")]
-    reason: Annotated[str, ""]
+    reason: Recorded[str]
     matched: Annotated[int | None, As("matched_mode")] = None
     modes: AssemblyModes | None = None
 

@@ -14,7 +14,7 @@ from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism.noise import Noise
 from ..mechanism.pose import Pose
-from ..records import DEG, FLAT, MM, As, Record, Shown, recorded
+from ..records import DEG, FLAT, MM, As, Record, Recorded, Shown, recorded
 from ..results import Result
 from .ending import Ending
 from .law import Measures
@@ -57,18 +57,18 @@ class Servo(Result, shown_as="servo"):
     start: Annotated[Pose, As("from")]
     goal: Annotated[Pose, As("to")]
     desired: Measures
-    gain: Annotated[float, ""]
+    gain: Recorded[float]
     sense: Annotated[str, Literal["exact", "edges", "pictures"]]
     noise: Noise | None
     run: Run
     track: Track
     ending: Annotated[Ending, FLAT]
-    depth: Annotated[str, ""]
+    depth: Recorded[str]
     settled: ClosedConfiguration
     target: ClosedConfiguration
     """The goal's configuration."""
-    spread: Annotated[Scatter | None, ""] = None
-    notes: Annotated[tuple[str, ...], ""] = ()
+    spread: Recorded[Scatter | None] = None
+    notes: Recorded[tuple[str, ...]] = ()
     """What a bench measured, in words."""
 
     def headline(self) -> str:

@@ -20,7 +20,7 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement
 from ...mechanism.pose import Grid, Pose
 from ...progress import tell
-from ...records import DEG, FLAT, MM, As, Table
+from ...records import DEG, FLAT, MM, As, Recorded, Table
 from ...results import Value
 from ...tolerances import SAME_RELATION, USUAL_ERROR
 from ..observed import ObservedRobot
@@ -74,7 +74,7 @@ class ErrorMap(Value):
     reached: Annotated[Flags, Table]
     position: Annotated[Array, Table, As("position_mm", scale=MM)]
     orientation: Annotated[Array, Table, As("orientation_deg", scale=DEG)]
-    gap: Annotated[float, ""]
+    gap: Recorded[float]
     seen: Seen
     spots: Annotated[Spots | None, As("checked")]
     smallest_at: Callable[[Array], Array] | None

@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 
 from ...geometry.vectors import Array
-from ...records import SCALED
+from ...records import SCALED, Recorded
 from ...results import Value
 
 
@@ -21,7 +21,7 @@ class ErrorRange(Value):
     least: Annotated[float | None, SCALED] = None
     largest: Annotated[float | None, SCALED] = None
     loose: Annotated[int, "how many are larger"] = 0
-    infinite: Annotated[int, ""] = 0
+    infinite: Recorded[int] = 0
     moves: bool = False
 
     @classmethod

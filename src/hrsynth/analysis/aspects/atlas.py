@@ -19,7 +19,7 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism.pose import ModeNumber, PoseLike
 from ...options import option
 from ...progress import tell
-from ...records import FLAT, As, Shown, recorded
+from ...records import FLAT, As, Recorded, Shown, recorded
 from ...results import Result, Value
 from ...tolerances import FOLLOWED
 from ..modes.modes import AssemblyModes, at_mode, modes
@@ -64,7 +64,7 @@ class Atlas(Result, shown_as="atlas"):
     aspects: Aspects
     listed: Annotated[AssemblyModes, FLAT]
     places: tuple[ClosedConfiguration | None, ...]
-    pairs: Annotated[tuple[ModePair, ...], ""]
+    pairs: Recorded[tuple[ModePair, ...]]
 
     def headline(self) -> str:
         """The robot, how many modes, in how many aspects."""

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from ...budgets import SECTION_APART, SECTION_ITERATIONS, SECTION_PLACES, SECTION_STEP, SECTION_STEPS
 from ...geometry.balls import around, jets
 from ...geometry.vectors import Array
-from ...records import As, Record, Shown
+from ...records import As, Record, Recorded, Shown
 from ...tolerances import COMPLEX_STEP, FOLLOWED, SAME_SPOT, SOLVED
 from ..modes.polynomials import krawczyk
 from .three_cranks import ThreeCranks
@@ -56,8 +56,8 @@ class HeldLegSection(Record):
     robot: ThreeCranks
     held: complex
     curve: tuple[Array, ...]
-    cusps: Annotated[tuple[SectionPoint, ...], ""]
-    nodes: Annotated[tuple[tuple[SectionPoint, SectionPoint], ...], ""]
+    cusps: Recorded[tuple[SectionPoint, ...]]
+    nodes: Recorded[tuple[tuple[SectionPoint, SectionPoint], ...]]
 
     held_record = Shown(str, lambda self: self.robot.labels[0], As("held"))
     directions = Shown(list[str], lambda self: self.robot.labels[1:])

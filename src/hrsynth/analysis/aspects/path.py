@@ -20,7 +20,7 @@ from ...mechanism.observation import Observation
 from ...mechanism.pose import ModeNumber, Pose, PoseLike, asked_pose
 from ...options import option
 from ...progress import tell
-from ...records import As, Shown, recorded
+from ...records import As, Recorded, Shown, recorded
 from ...results import Result, Value
 from ...tolerances import AS_PRINTED, RANK_CUTOFF, RANK_GAP, SOLVED
 from ..accuracy.cones import unseen
@@ -42,9 +42,9 @@ class PathEnd(Value):
     """A requested pose: the whole pose that is reached, the configuration in which it is, and the value of the
     condition there; at the goal of a path the value in the working modes in which the path ends."""
 
-    pose: Annotated[Pose, ""]
+    pose: Recorded[Pose]
     configuration: ClosedConfiguration
-    value: Annotated[float, ""]
+    value: Recorded[float]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -80,17 +80,17 @@ class PathAnswer(Result, shown_as="path"):
 
     setting: ObservedRobot
     verdict: Annotated[str, Literal["same aspect", "separated", "undecided"]]
-    certified: Annotated[bool, ""]
+    certified: Recorded[bool]
     poses: Annotated[tuple[Pose, ...], As("path")]
-    margin: Annotated[float | None, ""]
-    boxes: Annotated[int, ""]
-    start: Annotated[PathEnd, ""]
-    goal: Annotated[PathEnd, ""]
-    reason: Annotated[str, ""]
+    margin: Recorded[float | None]
+    boxes: Recorded[int]
+    start: Recorded[PathEnd]
+    goal: Recorded[PathEnd]
+    reason: Recorded[str]
     signed: bool
     coordinates: PathCoordinates | None = None
     ways: tuple[PathSegment, ...] = ()
-    limits: Annotated[tuple[str, ...], ""] = ()
+    limits: Recorded[tuple[str, ...]] = ()
     """Joints whose limits hold all along a certified path."""
     unlimited: tuple[str, ...] = ()
     """Joints whose limits are not considered."""

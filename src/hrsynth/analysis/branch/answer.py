@@ -10,7 +10,7 @@ import numpy as np
 
 from ...geometry.vectors import Array
 from ...mechanism import Mechanism
-from ...records import As, Number, Shown, Table, recorded
+from ...records import As, Number, Recorded, Shown, Table, recorded
 from ...results import Result, Value
 from .loops import LoopSystem
 
@@ -91,8 +91,8 @@ class BranchPart(Value):
     box about the zero configuration that was found in their union. ``turns``: for each motor whose box is a whole turn
     proved from end to end, whether the closure at the end is that of the beginning."""
 
-    motors: Annotated[tuple[str, ...], ""]
-    passive: Annotated[tuple[str, ...], ""]
+    motors: Recorded[tuple[str, ...]]
+    passive: Recorded[tuple[str, ...]]
     q0: Annotated[Array, list[float]]
     x0: Annotated[Array, list[float]]
     asked: Annotated[tuple[Array, Array], Table, "low and high of the requested box"]
@@ -100,13 +100,13 @@ class BranchPart(Value):
         tuple[Array, Array], Table, "low and high of a box about the zero configuration in the union of the cells"
     ]
     share: Annotated[float, "volume of all cells, as a share of the box"]
-    box_share: Annotated[float, ""]
-    cells: Annotated[tuple[BranchCell, ...], ""]
-    toggles: Annotated[tuple[Toggle, ...], ""]
+    box_share: Recorded[float]
+    cells: Recorded[tuple[BranchCell, ...]]
+    toggles: Recorded[tuple[Toggle, ...]]
     turns: tuple[tuple[str, bool], ...]
     closed_to: Annotated[float, "bound of the equations left out (characteristic lengths, pure numbers)"]
     """Bound of the equations that were left out, over all tubes; 0 where they are proved to hold."""
-    redundant: Annotated[str, ""]
+    redundant: Recorded[str]
     """Why the equations that were left out hold; empty where none was."""
 
     @property
@@ -156,20 +156,20 @@ class BranchProof(Result, shown_as="branch"):
 
     robot: Mechanism
     system: LoopSystem
-    motors: Annotated[tuple[str, ...], ""]
-    passive: Annotated[tuple[str, ...], ""]
-    held: Annotated[tuple[str, ...], ""]
-    parts: Annotated[tuple[BranchPart, ...], ""]
+    motors: Recorded[tuple[str, ...]]
+    passive: Recorded[tuple[str, ...]]
+    held: Recorded[tuple[str, ...]]
+    parts: Recorded[tuple[BranchPart, ...]]
     back: Annotated[tuple[Array, Array] | None, Table | None, f"{BACK}, or null"]
     """A box of all motors (m, rad), low and high (n,) each, about the zero configuration, in which no two are proved to
     give the platform one pose; None where there is no proof."""
     regular: Annotated[bool, "whether the proved box has no Type 1 singularity (proved)"]
     """Whether no motors in the proved box are proved to be at a Type 1 singularity."""
-    box: Annotated[str, ""]
+    box: Recorded[str]
     """Where the box comes from: the file's limits, the caller, a default."""
-    tried: Annotated[int, ""]
+    tried: Recorded[int]
     """Cells that were tried."""
-    limits: Annotated[tuple[BranchLimit, ...], ""]
+    limits: Recorded[tuple[BranchLimit, ...]]
     """The limits of joints without a motor."""
 
     @property

@@ -16,7 +16,7 @@ from ...kinematics.limits import outside
 from ...kinematics.relation import Measurement, relation
 from ...kinematics.tasks import Held
 from ...mechanism.pose import Pose
-from ...records import FLAT, As, Number, Record, Shown
+from ...records import FLAT, As, Number, Record, Recorded, Shown
 from ...tolerances import CLOSED, SAME_RELATION
 from ..observed import ObservedRobot
 from ..singularity.agreement import weakest
@@ -46,22 +46,22 @@ class AssemblyMode(Record):
     singular value of Mᵀ there, as ``check`` gives it; None if the robot was not closed, or if there is no Mᵀ.
     """
 
-    pose: Annotated[Pose, ""]
+    pose: Recorded[Pose]
     shift: float
     turn: float
-    residual: Annotated[float, ""]
-    goal: Annotated[bool, ""]
-    reachable: Annotated[bool | None, ""]
-    type2_distance: Annotated[float | None, ""]
+    residual: Recorded[float]
+    goal: Recorded[bool]
+    reachable: Recorded[bool | None]
+    type2_distance: Recorded[float | None]
     assembly: Annotated[str, Literal["yes", "beyond limits", "no", "not found"]] = NOT_FOUND
-    open: Annotated[tuple[str, ...], ""] = ()
-    beyond: Annotated[tuple[str, ...], ""] = ()
+    open: Recorded[tuple[str, ...]] = ()
+    beyond: Recorded[tuple[str, ...]] = ()
     misses: tuple[tuple[str, Miss], ...] = ()
     configuration: ClosedConfiguration | None = None
-    multiplicity: Annotated[int, ""] = 1
-    proved: Annotated[bool, ""] = False
+    multiplicity: Recorded[int] = 1
+    proved: Recorded[bool] = False
     """Whether there is exactly one mode within the radius, for all that the file's decimals and closed loops allow."""
-    rounded: Annotated[bool, ""] = False
+    rounded: Recorded[bool] = False
     """Whether that is proved for the rounded geometry alone, of which the radius then speaks."""
     fits: Annotated[float | None, "how well all legs fit if only some of them place it"] = None
     """How well all legs fit (characteristic lengths) where more is observed than needed and that is all that is known;
@@ -72,9 +72,9 @@ class AssemblyMode(Record):
     bodies: dict[str, Array] | None = None
     """Poses (4, 4) of the bodies on which legs end, where need be of the controlled one; of a formation of all bodies,
     moved by a trivial motion to where they are nearest to the goal's."""
-    opposite: Annotated[tuple[str, ...], ""] = ()
+    opposite: Recorded[tuple[str, ...]] = ()
     """What is seen there as the opposite value: then it is *antipodal* and no mode."""
-    behind: Annotated[tuple[str, ...] | None, ""] = None
+    behind: Recorded[tuple[str, ...] | None] = None
     """What is not in front of the camera by which it is seen; None where no camera with a name sees a point."""
     gears: Annotated[tuple[str, ...], As("open_couplings"), "couplings that were not closed where all legs were"] = ()
 

@@ -26,7 +26,7 @@ from ...kinematics.limits import outside
 from ...kinematics.pinocchio_model import PinocchioModel
 from ...kinematics.relation import Measurement
 from ...kinematics.tasks import Held, shorten_step, solve, system
-from ...records import As, Record, Shown
+from ...records import As, Record, Recorded, Shown
 from ...tolerances import (
     CLOSED,
     INVERTED,
@@ -54,13 +54,13 @@ class SelfMotion(Record):
     """
 
     configuration: ClosedConfiguration
-    dimension: Annotated[int, ""]
-    links: Annotated[tuple[str, ...], ""]
+    dimension: Recorded[int]
+    links: Recorded[tuple[str, ...]]
     shift: Annotated[float, As("followed_m")]
     turn: Annotated[float, As("followed_rad")]
-    returns: Annotated[bool, ""]
-    goal: Annotated[bool, ""] = False
-    met: Annotated[int, ""] = 0
+    returns: Recorded[bool]
+    goal: Recorded[bool] = False
+    met: Recorded[int] = 0
     way: tuple[dict[str, Array], ...] = field(default=(), repr=False)
     """The poses (4, 4) of the platform's bodies on the way."""
     beyond: Annotated[tuple[str, ...], "joints that are beyond their limits somewhere on the way"] = ()

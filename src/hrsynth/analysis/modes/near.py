@@ -22,7 +22,7 @@ from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.relation import Measurement, platform_motions, relation
 from ...kinematics.tasks import Held, shorten_step, solve
 from ...options import plain_number
-from ...records import As
+from ...records import As, Recorded
 from ...results import Value
 from ...tolerances import CURVATURE_STEP, FAMILY_STEP, SAME_GEOMETRY, SAME_NEAR_POSE, SOLVED, SURELY_SOMETHING
 from ..accuracy.cones import single_angle
@@ -41,8 +41,8 @@ class NearMode(AssemblyMode):
     angle: Annotated[float, "largest difference of a measured value (rad; lengths in characteristic lengths)"] = 0.0
     distance: Annotated[float, As("distance_m"), "from the goal"] = 0.0
     turned: Annotated[float, As("turned_rad"), "from the goal"] = 0.0
-    stable: Annotated[bool | None, ""] = None
-    family: Annotated[bool, ""] = False
+    stable: Recorded[bool | None] = None
+    family: Recorded[bool] = False
 
     @property
     def differs(self) -> str:

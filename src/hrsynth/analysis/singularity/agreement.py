@@ -25,7 +25,7 @@ from ...kinematics.relation import Measurement, platform_motions, relation
 from ...kinematics.walking import WEAKEST, random_walk
 from ...mechanism.sights import CameraObservation
 from ...progress import tell
-from ...records import As, Number, Shown
+from ...records import As, Number, Recorded, Shown
 from ...results import Value
 from ...tolerances import CLOSED, FOLLOWED, INVERTED, NUDGE, RANK_CUTOFF, RANK_GAP, SAME_RELATION, SAME_SPOT
 from .batch_spectrum import SPOTS, Quick
@@ -46,15 +46,15 @@ class Agreement(Value):
     by Pinocchio's relation; ``disagreements`` counts poses at which one sees a singularity and another none.
     """
 
-    points: Annotated[int, ""]
-    disagreements: Annotated[int, ""]
-    largest_angle: Annotated[float, ""]
+    points: Recorded[int]
+    disagreements: Recorded[int]
+    largest_angle: Recorded[float]
     smallest: Annotated[float, Number, As("smallest_singular_value")]
     """The smallest singular value of the relation met at the random poses."""
     sides: tuple[int, int]
     """Random poses with the expression positive and negative, where it has a sign."""
     on_locus: tuple[ClosedConfiguration, ...]
-    searches: Annotated[int, ""]
+    searches: Recorded[int]
     """Changes of sign and weak poses from which a pose on the locus was sought."""
 
     positive = Shown(int, lambda self: self.sides[0])

@@ -22,7 +22,7 @@ from ...kinematics.relation import Measurement
 from ...mechanism import Mechanism
 from ...mechanism.pose import Grid, Pose, as_pose
 from ...progress import tell
-from ...records import As, Number, Shown, recorded
+from ...records import As, Number, Recorded, Shown, recorded
 from ...results import Value
 from ...tolerances import ON_PLANE, SAME_RELATION, SAME_SPOT
 from ..measured import MeasuredRobot
@@ -60,8 +60,8 @@ class Locus(Value):
     """The fields of the hidden and, where it has motors that determine its platform, the real robot over a plane."""
 
     grid: Grid
-    hidden: Annotated[SingularityMap, ""]
-    real: Annotated[SingularityMap | None, ""]
+    hidden: Recorded[SingularityMap]
+    real: Recorded[SingularityMap | None]
 
     @property
     @recorded()

@@ -17,7 +17,7 @@ from ...kinematics.tasks import solve
 from ...mechanism.pose import Pose
 from ...options import option
 from ...progress import tell
-from ...records import As, Shown, Word, recorded
+from ...records import As, Recorded, Shown, Word, recorded
 from ...results import Result, Value
 from ...tolerances import SOLVED
 from ..freedoms import Freedom, name_freedoms
@@ -38,8 +38,8 @@ class Example(Value):
     there, and the largest a centimetre away."""
 
     configuration: ClosedConfiguration
-    pose: Annotated[Pose, ""]
-    lost: Annotated[tuple[Freedom, ...], ""]
+    pose: Recorded[Pose]
+    lost: Recorded[tuple[Freedom, ...]]
     sigma: Annotated[float, As("singular_value")]
     nearby: Annotated[float, As("singular_value_nearby"), "a centimetre away"]
 
@@ -77,9 +77,9 @@ class Singularity(Result, shown_as="singular"):
     pattern: ConstraintPattern
     condition: Condition | None
     """None where a freedom is lost everywhere."""
-    words: Annotated[str, ""]
+    words: Recorded[str]
     checked: Agreement | None
-    examples: Annotated[tuple[Example, ...], ""]
+    examples: Recorded[tuple[Example, ...]]
 
     @property
     @recorded()

@@ -41,7 +41,7 @@ from ...mechanism.pose import Grid, Pose, PoseLike, as_pose, asked_pose
 from ...options import option
 from ...processes import run_shared
 from ...progress import tell
-from ...records import FLAT, As, Number, Shown, Table, recorded
+from ...records import FLAT, As, Number, Recorded, Shown, Table, recorded
 from ...results import Result, Value
 from ...tolerances import RUNS_ALIKE, SEEN_ABOVE
 from ..ending import ENDINGS, GOAL, SIGHT, TIME, UNDECIDED, Ending, EndingClassifier
@@ -73,12 +73,12 @@ class BasinEnd(Value):
     as ``servo`` takes it."""
 
     ending: Annotated[Ending, FLAT]
-    pose: Annotated[Pose | None, ""]
+    pose: Recorded[Pose | None]
     X: Array | None
     size: float
     count: Annotated[int, As("starts")]
-    share: Annotated[float, ""]
-    example: Annotated[Pose, ""]
+    share: Recorded[float]
+    example: Recorded[Pose]
 
     error = Shown(Number, lambda self: None if self.X is None else self.size, "‖e‖")
 
@@ -103,13 +103,13 @@ class Basins(Result, shown_as="basins"):
     goal: Annotated[Pose, As("to")]
     target: ClosedConfiguration
     grid: Grid
-    ends: Annotated[tuple[BasinEnd, ...], ""]
+    ends: Recorded[tuple[BasinEnd, ...]]
     cells: Annotated[Places, Table, "numbers of ``ends``, counted from 0, -1 where no run starts"]
     damped: Flags
-    abreast: Annotated[bool, ""]
-    followed: Annotated[int, ""] = 0
-    checked: Annotated[int, ""] = 0
-    agreed: Annotated[int, ""] = 0
+    abreast: Recorded[bool]
+    followed: Recorded[int] = 0
+    checked: Recorded[int] = 0
+    agreed: Recorded[int] = 0
     certified: CertifiedRadius | None = None
     """From how far around the goal every start is proved to end there."""
 

@@ -18,6 +18,7 @@ from ...geometry.so3 import turn_about
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism import JointType
+from ...records import Recorded
 from ...results import Value
 from ...tolerances import (
     COVER_MARGIN,
@@ -48,7 +49,7 @@ class Cover(Value):
     found: tuple[CriticalBox, ...]
     open: tuple[tuple[Array, Array], ...]
     share: Annotated[float, "of the open boxes"]
-    boxes: Annotated[int, ""]
+    boxes: Recorded[int]
     bounded: bool
     reason: str = ""
     box: tuple[Array, Array] | None = None

@@ -14,7 +14,7 @@ from ...geometry.vectors import Array
 from ...kinematics.assembly import ASSEMBLED, BEYOND
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism.pose import Pose
-from ...records import FLAT, As, Number, Record, Shown, recorded
+from ...records import FLAT, As, Number, Record, Recorded, Shown, recorded
 from ...results import Result, Value
 from ...tolerances import SAME_ENDING
 from ..law import Measures
@@ -48,25 +48,25 @@ class RestPoint(Record):
     which it was found, ``met`` the number of starts that led to it.
     """
 
-    pose: Annotated[Pose, ""]
+    pose: Recorded[Pose]
     kind: Annotated[str, Literal["goal", "mode", "antipodal", "critical"]]
     stability: Annotated[str, Stability]
-    error: Annotated[float, ""]
+    error: Recorded[float]
     curvatures: Annotated[tuple[float, ...], "eigenvalues of the Hessian of ½ ‖e‖²"]
     configuration: ClosedConfiguration
     shift: Annotated[float, Number, As("radius_m")] = np.inf
     turn: Annotated[float, Number, As("radius_rad")] = np.inf
-    decided: Annotated[bool, ""] = False
+    decided: Recorded[bool] = False
     rates: Annotated[tuple[tuple[float, float], ...], "intervals of those of the linearised loop, times −1 / gain"] = ()
     side: Annotated[str | None, Literal["goal", "other"] | None, "of the Type 2 locus"] = None
-    reversed: Annotated[tuple[str, ...], ""] = ()
-    across: Annotated[tuple[str, ...], ""] = ()
-    singular: Annotated[str | None, ""] = None
-    boundary: Annotated[bool, ""] = False
-    beyond: Annotated[tuple[str, ...], ""] = ()
-    other_legs: Annotated[tuple[str, ...] | None, ""] = None
+    reversed: Recorded[tuple[str, ...]] = ()
+    across: Recorded[tuple[str, ...]] = ()
+    singular: Recorded[str | None] = None
+    boundary: Recorded[bool] = False
+    beyond: Recorded[tuple[str, ...]] = ()
+    other_legs: Recorded[tuple[str, ...] | None] = None
     met: Annotated[int, "how many starts led to it"] = 0
-    ways: Annotated[int, ""] = 1
+    ways: Recorded[int] = 1
 
     @property
     @recorded()
@@ -97,9 +97,9 @@ class SignedModes(Value):
     prove, None if they prove nothing, in ``turns`` turns of a platform that translates (lists of modes cover that of
     the goal)."""
 
-    reversed: Annotated[tuple[str, ...], ""]
+    reversed: Recorded[tuple[str, ...]]
     listed: AssemblyModes | None
-    boxes: Annotated[int | None, ""] = None
+    boxes: Recorded[int | None] = None
     turns: int = 1
 
     @property
@@ -152,12 +152,12 @@ class RestCover(Value):
     searched either, and ``apart`` rests of the list in all lie where nothing was searched."""
 
     cover: Annotated[Cover, FLAT]
-    alone: Annotated[tuple[BoxedRest, ...], ""]
-    strangers: Annotated[int, ""]
+    alone: Recorded[tuple[BoxedRest, ...]]
+    strangers: Recorded[int]
     within: Annotated[float | None, As("within_m"), "of the goal, null if the legs bound the box"]
     shorter: Annotated[float | None, As("shorter_m"), "null if no rod slides"] = None
-    turned: Annotated[int, ""] = 0
-    apart: Annotated[int, ""] = 0
+    turned: Recorded[int] = 0
+    apart: Recorded[int] = 0
 
     @property
     @recorded()
@@ -261,10 +261,10 @@ class Endings(Result, shown_as="endings"):
     rests: tuple[RestPoint, ...]
     continua: Annotated[tuple[RestPoint, ...], "one from each family that fills a curve or surface"]
     lists: Annotated[tuple[SignedModes, ...], As("signs")]
-    measured: Annotated[tuple[str, ...], ""]
+    measured: Recorded[tuple[str, ...]]
     search: CriticalPoints
-    cover: Annotated[RestCover | None, ""] = None
-    depth: Annotated[str, ""] = "exact"
+    cover: Recorded[RestCover | None] = None
+    depth: Recorded[str] = "exact"
 
     @property
     @recorded()
