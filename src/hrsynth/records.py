@@ -3,8 +3,9 @@
 A member of a record is
 
 * a field of a dataclass that is :data:`Recorded` or annotated with more than its type:
-  ``Annotated[float, As("time_s"), "when it ended"]``. Of what stands behind the type, a text says what it is, :class:`As` how it is told, and anything else is its type in
-  JSON where that differs: ``Annotated[Array, list[float], "low ends (m, rad)"]``;
+  ``Annotated[float, As("time_s"), "when it ended"]``. Of what stands behind the type, a text says what it is,
+  :class:`As` how it is told, and anything else is its type in JSON where that differs:
+  ``Annotated[Array, list[float], "low ends (m, rad)"]``;
 * a property under :func:`recorded`;
 * :class:`Shown`, a value that only the record has.
 
