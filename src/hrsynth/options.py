@@ -146,7 +146,7 @@ def plain_signature(function: Callable[..., Any]) -> Signature:
     """A function's signature without what annotates its types."""
     known = signature(function)
     plain = [
-        each.replace(annotation=str(each.annotation).removeprefix("Annotated[").partition(",")[0].strip())
+        each.replace(annotation=str(each.annotation).removeprefix("Annotated[").partition(", option(")[0])
         if str(each.annotation).startswith("Annotated[")
         else each
         for each in known.parameters.values()
