@@ -21,16 +21,13 @@ REFUSED = "refused: "
 """What the last line of such a program begins with where it refuses what it reads."""
 
 
-def gunzip(content: bytes, file: object, most: int, *, whole: bool = True) -> bytes:
-    """What bytes of gzip unpack to; raises ``BadRequest`` where they are none, cut off, or unpack to too much. Not
-    ``whole``: only the first of it, so many bytes at most."""
+def gunzip(content: bytes, file: object, most: int) -> bytes:
+    """What bytes of gzip unpack to; raises ``BadRequest`` where they are none, cut off, or unpack to too much."""
     parts, size = [], 0
     try:
         while content:
             inflate = zlib.decompressobj(wbits=31)
-            parts.append(inflate.decompress(content, most - size + whole))
-            if not whole:
-                break
+            parts.append(inflate.decompress(content, most - size + 1))
             size += len(parts[-1])
             if size > most:
                 raise BadRequest(f"{file}: unpacks to", f"more than {most} bytes", f"up to {most}")

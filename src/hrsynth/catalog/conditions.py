@@ -225,7 +225,7 @@ def _fitting(lines: Sequence[str], question: RecordQuestion, read: Callable[[str
             fill(memory, lines, question.columns(), read)
             return [row - 1 for row in question.rows(memory)]
     except sqlite3.Error as error:
-        raise BadRequest("records of the catalog that no question reads", str(error)) from None
+        raise BadRequest("not a record of the catalog", str(error)[:60]) from None
 
 
 def _said(found: Record) -> bytes:
