@@ -17,7 +17,7 @@ LOCK = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generat
 	--no-annotate --custom-compile-command "make lock" $(LOCKFLAGS) pyproject.toml --group build
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all test-long fuzz adversary bounds endings files parroblib bench lint types index robots readme catalog notebooks jupyter docs pictures lock three release setup setup-dev setup-all setup-browser clean
+.PHONY: help demo test test-all test-long golden fuzz adversary bounds endings files parroblib bench lint types index robots readme catalog notebooks jupyter docs pictures lock three release setup setup-dev setup-all setup-browser clean
 .DELETE_ON_ERROR:
 
 help:  ## this list
@@ -39,6 +39,9 @@ test-long: setup-all  ## the tests that are left: all members of each law, many 
 
 fuzz: setup-dev  ## 100,000 mutations of robot files (MUTATIONS=, SEED=): each is read or refused
 	@$(BIN)/python tests/description/foreign/fuzz.py --count $(MUTATIONS) --seed $(SEED)
+
+golden: setup-all  ## what every command answers, held against the golden files (ONLY=TEXT: cases that hold it; an hour)
+	@cd tests && OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 ../$(BIN)/python -m golden.run compare --only "$(ONLY)" --workers $(JOBS)
 
 bounds: setup-dev  ## 10,000 random instances of every family of assembly modes (INSTANCES=10000; half an hour)
 	@cd tests && OMP_NUM_THREADS=1 ../$(BIN)/python -m analysis.modes.bounds $(INSTANCES)
