@@ -201,7 +201,12 @@ def answer(case: Case) -> Json:
         argv = [word.format(**given) if word.startswith("{") else word for word in case.argv]
 
         def plain(text: str) -> str:
-            for path, name in ((folder, "FOLDER"), (str(MODELS), "MODELS"), (str(MODELS.parents[1]), "ROOT")):
+            for path, name in (
+                (folder, "FOLDER"),
+                (str(Path(hrsynth.__file__).parent), "PACKAGE"),
+                (str(MODELS), "MODELS"),
+                (str(MODELS.parents[1]), "ROOT"),
+            ):
                 text = text.replace(path, name)
             return text
 

@@ -237,9 +237,9 @@ def test_the_distance_to_another_verdict_is_told(tilt: float, rank: int, near: b
         verdict = legs(robot, seed=seed).sets[-1]
         assert (verdict.rank, verdict.near) == (rank, near)
         margin = verdict.margin
-        assert margin["dropped"] < margin["cutoff"] < margin["counted"]
+        assert margin.dropped < margin.cutoff < margin.counted
         if near:
-            value = margin["counted" if rank == 2 else "dropped"]
+            value = margin.counted if rank == 2 else margin.dropped
             assert tilt / 10 < value < 10 * tilt
 
 

@@ -26,6 +26,7 @@ from hrsynth.geometry.vectors import unit
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.platform_motion import PlatformMotion
 from hrsynth.mechanism.pose import Pose
+from hrsynth.present import palette
 from hrsynth.present.maps import _boundary, _drawn_locus, locus_map
 from hrsynth.present.plots import MapPlane
 
@@ -94,13 +95,14 @@ def test_what_is_not_reached_is_empty() -> None:
 
 def test_the_picture_shows_the_loci() -> None:
     import matplotlib.image
+    from matplotlib.colors import to_rgb
 
     data = locus_map(found("3rrr_m1"), planar())
     assert data.startswith(b"\x89PNG\r\n\x1a\n")
     pixels = matplotlib.image.imread(io.BytesIO(data))[..., :3]
     assert min(pixels.shape[:2]) > 300
-    for colour in ((0.86, 0.08, 0.24), (0.25, 0.41, 0.88)):
-        assert np.sum(np.all(np.abs(pixels - colour) < 0.06, axis=2)) > 100
+    for colour in (palette.colour("actuator"), palette.PAGE["ink"]):
+        assert np.sum(np.all(np.abs(pixels - to_rgb(colour)) < 0.06, axis=2)) > 100
 
 
 def test_the_edge_of_the_map_is_no_limit_of_reach() -> None:

@@ -13,6 +13,7 @@ from ...analysis.observed import ObservedRobot
 from ...errors import HrsynthError
 from ...geometry.vectors import Array, inverse
 from ...mechanism.pose import Pose
+from ...records import Recorded
 from ...results import Value
 from .states import page_values, place
 
@@ -23,9 +24,9 @@ class ModeOutline(Value):
     assembled there, as ``AssemblyMode`` says it twice, and the displacement (7,) of each link, None of those whose
     place is not known."""
 
-    label: str
-    pose: Pose
-    reachable: bool | None
+    label: Recorded[str]
+    pose: Recorded[Pose]
+    reachable: Recorded[bool | None]
     assembly: str
     places: tuple[Array | None, ...]
 

@@ -23,6 +23,7 @@ from ...kinematics.platform_motion import Goal
 from ...kinematics.steps import approach, track
 from ...kinematics.tasks import Target, solve, system
 from ...mechanism import Mechanism
+from ...records import Number, Recorded, Shown
 from ...results import Value
 from ...tolerances import FOLLOWED, SOLVED
 from .scale import error
@@ -64,21 +65,13 @@ class Slider(Value):
     """One freedom of the platform: its coordinate's values (n,) in metres or radians, the state at each of them, and
     which of them is home."""
 
-    name: str
-    unit: str
-    values: tuple[float, ...]
+    name: Recorded[str]
+    unit: Recorded[str]
+    values: Recorded[tuple[float, ...]]
     states: tuple[ViewState, ...]
-    home: int
+    home: Recorded[int]
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {
-            "name": self.name,
-            "unit": self.unit,
-            "values": list(self.values),
-            "home": self.home,
-            "distances": [state.distance for state in self.states],
-        }
+    distances = Shown(list[Number], lambda self: [state.distance for state in self.states])
 
     def scene(self) -> dict[str, Any]:
         """What the page is given."""

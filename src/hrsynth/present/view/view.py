@@ -20,6 +20,7 @@ from ...mechanism.observation import Observation
 from ...mechanism.observations.direction import Direction
 from ...options import option
 from ...progress import tell
+from ...records import FLAT, As, Number, Recorded, Shown, recorded
 from ...results import Result, Value
 from ..outputs import OUTPUTS, function
 from .meshes import meshes
@@ -76,22 +77,23 @@ class Arrow(Value):
 class View(Result, shown_as="view"):
     """All that the page needs. ``normal`` (3,) is that of the plane in which everything moves, None in space."""
 
-    setting: ObservedRobot
+    setting: Annotated[ObservedRobot, FLAT]
     derivation: Derivation | None
     mover: Mover
     machines: tuple[Machine, ...]
     home: ViewState
-    sliders: tuple[Slider, ...]
+    sliders: Recorded[tuple[Slider, ...]]
     arrows: tuple[Arrow, ...]
-    mode_outlines: tuple[ModeOutline, ...]
+    mode_outlines: Annotated[tuple[ModeOutline, ...], As("modes")]
     normal: Array | None
-    notes: tuple[str, ...]
+    notes: Recorded[tuple[str, ...]]
 
     def headline(self) -> str:
         """The robot, and how much there is to see of it."""
         return f"{self.setting.robot.name}, {len(self.sliders)} sliders, {len(self.mode_outlines)} other assembly modes"
 
     @property
+    @recorded(As("largest_distance"))
     def largest(self) -> float | None:
         """The largest of the smallest singular values that are shown: the far end of the scale of colours."""
         found = [state.distance for slider in self.sliders for state in slider.states]
@@ -108,21 +110,9 @@ class View(Result, shown_as="view"):
         ``address`` and ``stop()``. Port 0 is any free port. Raises ``BadRequest``."""
         return function("studio.server:view_server")(self, port, open_)
 
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {
-            **self.setting.to_dict(),
-            "dof": self.setting.dof,
-            "shown": {machine.key: machine.words for machine in self.machines},
-            "distance": self.home.distance,
-            "largest_distance": self.largest,
-            "sliders": [slider.to_dict() for slider in self.sliders],
-            "modes": [
-                {"label": outline.label, "pose": outline.pose.to_dict(), "reachable": outline.reachable}
-                for outline in self.mode_outlines
-            ],
-            "notes": list(self.notes),
-        }
+    dof = Shown(int, lambda self: self.setting.dof)
+    shown = Shown(dict[str, str], lambda self: {machine.key: machine.words for machine in self.machines})
+    distance = Shown(Number, lambda self: self.home.distance)
 
     def scene(self) -> dict[str, Any]:
         """What the page is given."""
