@@ -53,7 +53,7 @@ def test_a_lock_holds_all_that_its_packages_need(name: str):
 
 def test_an_unknown_name_is_an_attribute_error():
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
-        _ = hrsynth.nothing
+        _ = hrsynth.nothing  # type: ignore[attr-defined]
     with pytest.raises(ImportError):
         exec("from hrsynth import nothing")
 
