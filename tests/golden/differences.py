@@ -18,8 +18,9 @@ Json = Any
 
 
 def masked(text: str) -> list[str]:
-    """The lines of a text, numbers and widths of columns left out."""
-    return [" ".join(NUMBER.sub("#", line).replace("─", "-").split()) for line in text.splitlines()]
+    """The lines of a text, numbers, widths of columns and progress, which depends on the machine, left out."""
+    lines = [" ".join(NUMBER.sub("#", line).replace("─", "-").split()) for line in text.splitlines()]
+    return [line for line in lines if ", step #" not in line]
 
 
 def inlined(schema: Json, parts: Json, inside: tuple[str, ...] = ()) -> Json:
