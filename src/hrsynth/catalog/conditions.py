@@ -237,7 +237,7 @@ def places(lines: Sequence[str], asked: Mapping[str, Any], read: Callable[[str],
     hinted = [each.hints for each in questions if len(each.hints) == len(each.values)]
 
     def may_fit(line: str) -> bool:
-        return all(any(may(line) for may in hints) for hints in hinted) or not is_written(line)
+        return not is_written(line) or all(any(may(line) for may in hints) for hints in hinted)
 
     left: Sequence[int] = [i for i, line in enumerate(lines) if may_fit(line)] if hinted else range(len(lines))
     for question in questions:
