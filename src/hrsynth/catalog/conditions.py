@@ -153,11 +153,11 @@ class RecordQuestion:
     """Of each value, whether its condition may hold of a line."""
 
     @classmethod
-    def of(cls, asked: Mapping[str, Any]) -> RecordQuestion:
+    def of(cls, *asked: tuple[str, Any]) -> RecordQuestion:
         """Of several values in a tuple or list one has to be met. Raises ``BadRequest`` for a value that none can
         have."""
         clauses, values, hints = list[str](), list[Any](), list[LineTest]()
-        for name, value in asked.items():
+        for name, value in asked:
             terms = []
             for each in value if isinstance(value, tuple | list) else () if value is None else (value,):
                 condition, told = _condition(name, each.item() if hasattr(each, "item") else each)
@@ -233,7 +233,7 @@ def places(lines: Sequence[str], asked: Mapping[str, Any], read: Callable[[str],
     """Where among lines those of records are that fit: of those that may, one condition after the other, each of what
     the ones before left. Records are read for texts alone; raises what ``read`` raises for lines that are no records,
     where that is seen."""
-    questions = [RecordQuestion.of({name: asked[name]}) for name in CONDITIONS if asked.get(name) is not None]
+    questions = [RecordQuestion.of((name, asked[name])) for name in CONDITIONS if asked.get(name) is not None]
     hinted = [each.hints for each in questions if len(each.hints) == len(each.values)]
 
     def may_fit(line: str) -> bool:
