@@ -12,7 +12,7 @@ from typing import Any
 
 from ..budgets import LARGEST_RECORD
 from ..errors import BadRequest
-from .jsonl import LINE_START, Record, is_written, leading_word, record
+from .jsonl import FLAGS, LINE_START, Record, is_written, leading_word, record
 from .known import kinds, kinds_called, known_as
 from .words import LONGEST_COUNT, MOVED, count_equal, sights
 
@@ -49,6 +49,9 @@ LONGEST_PATTERN = 50_000
 """Bytes of a pattern, above which SQLite takes none."""
 
 
+LineTest = Callable[[str], bool]
+
+
 @dataclass(frozen=True)
 class RecordCondition:
     """What is asked for by one name."""
@@ -57,6 +60,8 @@ class RecordCondition:
     """In SQL, ``{0}`` for the value."""
     read: Callable[[Any], Any]
     """The value as SQL is told it: None for one that none has. Raises ``BadRequest`` for one that none can have."""
+    hint: Callable[[Any], LineTest] | None = None
+    """Whether it may hold of a line as a build writes it, so that others are left out; None where all may fit."""
 
 
 def _same(value: Any) -> Any:
@@ -85,21 +90,41 @@ def _folded(text: str) -> bytes | None:
     return None if BETWEEN in text else text.casefold().encode("utf-8", "surrogatepass")
 
 
+def _having(name: str, read: Callable[[Any], Any] = _same) -> RecordCondition:
+    """That a field has a value. 1 is also True, and 3 also 3.0, which are not so written."""
+    exact = (str, bool if name in FLAGS else int)
+
+    def hint(value: Any) -> LineTest:
+        part = f'"{name}":{json.dumps(value)}' if type(value) in exact else ""
+        return lambda line: part in line
+
+    return RecordCondition(f'"{name}" = {{0}}', read, hint)
+
+
+def _may_hold(sought: bytes | None) -> LineTest:
+    """Whether a text may stand in a line letter by letter, or is in a name of its robot."""
+    text = (sought or b"").decode("utf-8", "surrogatepass")
+    called = kinds_called(text)
+    if not re.fullmatch(r"[a-z0-9*+!.{|}()-]+( +[a-z0-9*+!.{|}()-]+)*", text):
+        return lambda line: True
+    return lambda line: text in line.casefold() or (bool(called) and kinds(leading_word(line)) in called)
+
+
 CONDITIONS: Mapping[str, RecordCondition] = {
-    "group": RecordCondition('"group" = {0}', _same),
-    "dof": RecordCondition("dof = {0}", _same),
-    "motion": RecordCondition("motion = {0}", _same),
-    "verdict": RecordCondition("verdict = {0}", _same),
-    "base_motors": RecordCondition("base_motors = {0}", _same),
-    "driven": RecordCondition("driven = {0}", _same),
+    "group": _having("group"),
+    "dof": _having("dof"),
+    "motion": _having("motion"),
+    "verdict": _having("verdict"),
+    "base_motors": _having("base_motors"),
+    "driven": _having("driven"),
     "motors": RecordCondition("drives = {0}", _letters),
     "parallelograms": RecordCondition("parallelograms = {0}", _same),
-    "fewest": RecordCondition("fewest = {0}", _same),
-    "see": RecordCondition("see = {0}", lambda text: _same(count_equal(sights(text)))),
-    "modes": RecordCondition("modes_bound = {0}", _same),
-    "legs": RecordCondition("legs = {0}", lambda number: _same(int(number))),
+    "fewest": _having("fewest"),
+    "see": _having("see", lambda text: count_equal(sights(text))),
+    "modes": _having("modes_bound"),
+    "legs": _having("legs", lambda number: _same(int(number))),
     "text": RecordCondition(
-        "(said IN (SELECT said FROM texts WHERE instr(text, {0})) OR instr(lower(word), {0}))", _folded
+        "(said IN (SELECT said FROM texts WHERE instr(text, {0})) OR instr(lower(word), {0}))", _folded, _may_hold
     ),
 }
 """What can be asked for."""
@@ -124,21 +149,24 @@ class RecordQuestion:
 
     where: str
     values: Sequence[Any]
+    hints: Sequence[LineTest]
+    """Of each value, whether its condition may hold of a line."""
 
     @classmethod
-    def of(cls, asked: Mapping[str, Any]) -> RecordQuestion:
+    def of(cls, *asked: tuple[str, Any]) -> RecordQuestion:
         """Of several values in a tuple or list one has to be met. Raises ``BadRequest`` for a value that none can
         have."""
-        clauses, values = list[str](), list[Any]()
-        for name, value in asked.items():
+        clauses, values, hints = list[str](), list[Any](), list[LineTest]()
+        for name, value in asked:
             terms = []
             for each in value if isinstance(value, tuple | list) else () if value is None else (value,):
                 condition, told = _condition(name, each.item() if hasattr(each, "item") else each)
                 values.append(told)
+                hints += [condition.hint(told)] if condition.hint else []
                 terms.append(condition.where.format(f"?{len(values)}"))
             if value is not None:
                 clauses.append(_any_of(terms))
-        return cls(" AND ".join(clauses), values)
+        return cls(" AND ".join(clauses), values, hints)
 
     def columns(self) -> list[str]:
         """The columns that are looked at."""
@@ -202,15 +230,17 @@ def fill(
 
 
 def places(lines: Sequence[str], asked: Mapping[str, Any], read: Callable[[str], Record]) -> Sequence[int]:
-    """Where among lines those of records are that fit: one condition after the other, each of what the ones before
-    left. Records are read for texts alone, of lines that may hold them; raises what ``read`` raises for lines that are
-    no records, where that is seen."""
-    questions = {name: RecordQuestion.of({name: asked[name]}) for name in CONDITIONS if asked.get(name) is not None}
-    left: Sequence[int] = range(len(lines))
-    for name, question in questions.items():
-        if name == "text":
-            sought = [each.decode("utf-8", "surrogatepass") for each in question.values if each is not None]
-            left = [i for i in left if any(_may_hold(lines[i], each) for each in sought)]
+    """Where among lines those of records are that fit: of those that may, one condition after the other, each of what
+    the ones before left. Records are read for texts alone; raises what ``read`` raises for lines that are no records,
+    where that is seen."""
+    questions = [RecordQuestion.of((name, asked[name])) for name in CONDITIONS if asked.get(name) is not None]
+    hinted = [each.hints for each in questions if len(each.hints) == len(each.values)]
+
+    def may_fit(line: str) -> bool:
+        return not is_written(line) or all(any(may(line) for may in hints) for hints in hinted)
+
+    left: Sequence[int] = [i for i, line in enumerate(lines) if may_fit(line)] if hinted else range(len(lines))
+    for question in questions:
         left = [left[i] for i in _fitting([lines[i] for i in left], question, read)]
     return left
 
@@ -253,14 +283,3 @@ def chains(notation: str | None) -> str:
     text = notation or ""
     found = {text, *(re.sub(r"^[0-9]+-", "", term) for term in re.split(r"\+(?![^{]*})", text))}
     return json.dumps(sorted({name for each in found if each for name in (each, each.replace("*", ""))}))
-
-
-def _may_hold(line: str, text: str) -> bool:
-    """Whether the record of a line may hold a casefolded text, or be known by it, without reading it: where the line is
-    as a build writes it, and the text would stand in it letter by letter."""
-    return (
-        text in line.casefold()
-        or not re.fullmatch(r"[a-z0-9*+!.{|}()-]+( +[a-z0-9*+!.{|}()-]+)*", text)
-        or not is_written(line)
-        or kinds(leading_word(line)) in kinds_called(text)
-    )

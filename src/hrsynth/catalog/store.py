@@ -150,7 +150,7 @@ class Database:
         return found
 
     def lines(self, groups: Sequence[str], asked: Mapping[str, Any]) -> Sequence[str]:
-        question = RecordQuestion.of({**asked, "group": tuple(groups)})
+        question = RecordQuestion.of(("group", tuple(groups)), *asked.items())
         with _refusing_sqlite_errors(self.path):
             file = self._open()
             counted = "sum(count), (SELECT max(record) FROM records), (SELECT max(record) FROM lines)"
