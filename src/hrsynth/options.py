@@ -10,10 +10,11 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from inspect import Parameter, Signature, signature
-from types import NoneType, SimpleNamespace
-from typing import Annotated, Any, get_args, get_origin, get_type_hints
+from types import NoneType
+from typing import Annotated, Any, get_args, get_origin
 
 from .errors import BadRequest
+from .records import resolve_hints
 
 NEEDED: Any = ...
 """The default of what must be given."""
@@ -159,8 +160,7 @@ def _annotated(annotation: Any, place: dict[str, Any]) -> tuple[Any, ...]:
     if isinstance(annotation, str):
         if not annotation.startswith("Annotated[") and get_origin(place.get(annotation)) is not Annotated:
             return (annotation,)
-        found = SimpleNamespace(__annotations__={"it": annotation})
-        annotation = get_type_hints(found, place, include_extras=True)["it"]
+        annotation = resolve_hints({"it": annotation}, place["__name__"])["it"]
     return get_args(annotation) if get_origin(annotation) is Annotated else (annotation,)
 
 

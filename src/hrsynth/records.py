@@ -110,9 +110,6 @@ class Shown:
     def __init__(self, kind: Any, get: Callable[[Any], Any], *extras: Any) -> None:
         self.kind, self.get, self.extras = kind, get, extras
 
-    def __set_name__(self, owner: type, name: str) -> None:
-        self.name = name
-
     def __get__(self, instance: Any, owner: type | None = None) -> Any:
         return self if instance is None else self.get(instance)
 
@@ -205,9 +202,7 @@ def members(kind: type) -> tuple[Member, ...]:
         told = {
             name: hint for name, hint in known.items() if named or str(hint).startswith(("Annotated[", "Recorded["))
         }
-        place = vars(sys.modules[base.__module__])
-        hints = get_type_hints(SimpleNamespace(__annotations__=told), place, include_extras=True)
-        found |= {name: _member(name, hint) for name, hint in hints.items()}
+        found |= {name: _member(name, hint) for name, hint in resolve_hints(told, base.__module__).items()}
         for name, value in vars(base).items():
             if isinstance(value, Shown):
                 found[name] = _member(name, Annotated[(value.kind, "", *value.extras)])
@@ -283,6 +278,17 @@ def object_schema(kinds: Sequence[Any], parts: dict[str, Any]) -> dict[str, Any]
 def summary(kind: type) -> str:
     """What a class says of itself first, before it comes to its fields."""
     return re.split(r"\.(?:\s|$)|[;:,] ``", " ".join((kind.__doc__ or "").split()), maxsplit=1)[0] + "."
+
+
+def answer_type(function: Callable[..., Any]) -> Any:
+    """The class of what a function answers, from its annotation."""
+    return vars(sys.modules[function.__module__])[function.__annotations__["return"]]
+
+
+def resolve_hints(annotations: Mapping[str, Any], module: str) -> dict[str, Any]:
+    """Some of the annotations of a module's class or function, as types with what annotates them; the others may name
+    what is imported for type checkers alone."""
+    return get_type_hints(SimpleNamespace(__annotations__=annotations), vars(sys.modules[module]), include_extras=True)
 
 
 def recorded_type(kind: Any) -> Any:

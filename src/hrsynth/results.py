@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields, is_dataclass, replace
 from functools import wraps
@@ -12,7 +11,7 @@ from math import isfinite
 from typing import Any, ClassVar, ParamSpec, TypeVar
 
 from .errors import shorten_text
-from .records import Record
+from .records import Record, answer_type
 
 LONGEST_LINE, LONGEST_PART = 160, 48
 """Characters of a value at a prompt, and of each of its fields there."""
@@ -129,8 +128,7 @@ class Result(Compared):
     @staticmethod
     def answer_of(name: str) -> type[Result]:
         """The class of a public function's answers."""
-        function = Result.public(name)
-        found: type[Result] = vars(sys.modules[function.__module__])[function.__annotations__["return"]]
+        found: type[Result] = answer_type(Result.public(name))
         return found
 
     def require_answered(self, **asked: Any) -> None:

@@ -33,11 +33,12 @@ class Question:
         """Make it a command."""
         declared = analyses()[self.name]
         files = outputs_of(self.name).files
-        own = [each for each in options(self.name) if each.name != "seed"]
+        given = options(self.name)
+        own = [each for each in given if each.name != "seed"]
         own += [each for file in files for each in file.asks]
         own += [_file_option(each) for each in files if each.option is not None]
         drawn = FIGURE if any(each.drawn for each in files) else ()
-        seed = [each for each in options(self.name) if each.name == "seed" and declared["seeded"]]
+        seed = [each for each in given if each.name == "seed" and declared["seeded"]]
         every = [SOURCE[0], *own, *self.more, *seed, *drawn, JSON, *SOURCE[1:]]
         add_command(app, self.name, declared["help"], every, self.answer, declared["examples"])
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json as javascript
-import sys
-from collections.abc import Callable
 from inspect import signature
 from typing import Any
 
@@ -13,7 +11,7 @@ import hrsynth
 from .. import records
 from ..options import NEEDED, Option
 from ..present.outputs import File, function, outputs_of
-from ..records import Head, OfRobot, object_schema, summary
+from ..records import Head, OfRobot, answer_type, object_schema, summary
 from .app import app
 from .colour import say
 from .commands import DeclaredCommand, Group, add_command
@@ -35,11 +33,13 @@ def schema(command: str) -> dict[str, Any]:
     if kind is not None:
         head = object_schema([kind], parts)
     else:
-        kind, files = _answer(getattr(hrsynth, command)), outputs_of(command).files
+        kind, files = answer_type(getattr(hrsynth, command)), outputs_of(command).files
         of_robot = "robot" in signature(getattr(hrsynth, command)).parameters
         head = object_schema([OfRobot if of_robot else Head, kind], parts)
     fields = {file.field: str | None for file in files if file.option is not None and file.field is not None}
-    fields |= {file.record: _answer(function(file.computed)) | None for file in files if file.record and file.computed}
+    fields |= {
+        file.record: answer_type(function(file.computed)) | None for file in files if file.record and file.computed
+    }
     head["properties"] |= {name: records.schema(each, parts) for name, each in fields.items()}
     head["required"] = sorted([*head["required"], *fields])
     told = {"title": f"hrsynth {command} --json", "description": summary(kind)}
@@ -51,11 +51,6 @@ def commands() -> dict[str, DeclaredCommand]:
     every: list[Any] = [*app.commands.values()]
     leaves = [each for group in every for each in getattr(group, "commands", {"": group}).values()]
     return {each.name: each for each in leaves if any(option.name == "json" for option in each.options)}
-
-
-def _answer(asked: Callable[..., Any]) -> Any:
-    """The class of what a function answers."""
-    return vars(sys.modules[asked.__module__])[asked.__annotations__["return"]]
 
 
 def page() -> str:

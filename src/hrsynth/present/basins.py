@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import re
 from collections import Counter
 from typing import Any
@@ -31,6 +29,7 @@ from .plots import (
 from .pose_map import PoseMap
 from .runs import ENDS
 from .sketch import axis_label
+from .text.tables import csv_bytes
 
 SHADES = {
     GOAL: (palette.tint(palette.colour("goal"), 0.55), palette.tint(palette.colour("goal"), 0.25)),
@@ -334,11 +333,9 @@ def letter_offsets(marks: Array, distance: float) -> list[tuple[float, float]]:
 def table(found: Basins) -> bytes:
     """Comma-separated values: a line a start (metres, radians), what its run ended at, and whether it came to a
     singularity; empty where the robot cannot start."""
-    stream = io.StringIO()
-    lines = csv.writer(stream, lineterminator="\n")
-    lines.writerow([*found.grid.names, "end", "ended", "damped"])
+    rows: list[list[Any]] = [[*found.grid.names, "end", "ended", "damped"]]
     places, marks = found.grid.places().tolist(), found.damped.ravel()
     for place, cell, damped in zip(places, found.cells.ravel(), marks, strict=True):
         told = ["", "", ""] if cell == NOT_REACHED else [LETTERS[cell], found.ends[cell].ending.name, int(damped)]
-        lines.writerow([*map(repr, place), *told])
-    return stream.getvalue().encode()
+        rows.append([*map(repr, place), *told])
+    return csv_bytes(rows)

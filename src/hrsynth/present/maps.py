@@ -3,8 +3,6 @@ how large errors are (MMT Figs. 19-21)."""
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterator
 from itertools import product
 from typing import TYPE_CHECKING, Any
@@ -34,6 +32,7 @@ from .plots import (
     tick_words,
 )
 from .pose_map import PoseMap
+from .text.tables import csv_bytes
 
 if TYPE_CHECKING:
     from ..analysis.accuracy.accuracy import Accuracy
@@ -178,15 +177,14 @@ def _scale(numbers: Array) -> tuple[float, float, Array]:
 def check_table(found: Check) -> bytes:
     """Comma-separated values: a line a pose (metres, radians), its state, and what was measured there."""
     assert found.grid is not None
-    grid, stream = found.grid, io.StringIO()
+    grid = found.grid
     given = [name for name in PARTS if grid.grid.poses()[0].given.get(name)]
-    lines = csv.writer(stream, lineterminator="\n")
-    lines.writerow([*given, "state", *MEASURES])
+    rows: list[list[Any]] = [[*given, "state", *MEASURES]]
     columns = [grid.values(measure) for measure in MEASURES]
     for i, (pose, state) in enumerate(zip(grid.grid.poses(), grid.states, strict=True)):
         values = ["/".join(map(repr, pose.given[name])) for name in given]
-        lines.writerow([*values, state, *("" if column[i] is None else repr(column[i]) for column in columns)])
-    return stream.getvalue().encode()
+        rows.append([*values, state, *("" if column[i] is None else repr(column[i]) for column in columns)])
+    return csv_bytes(rows)
 
 
 def require_plane(setting: ObservedRobot, plane: Pose | str | None = None, **_: Any) -> None:

@@ -7,8 +7,6 @@ when it is wanted.
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -19,6 +17,7 @@ from typing import Any
 from ..errors import BadRequest
 from ..options import Option
 from ..results import Result
+from .text.tables import csv_bytes
 
 Content = bytes | Iterable[bytes]
 Asked = Mapping[str, Any]
@@ -416,6 +415,4 @@ def outputs_of(name: str) -> Outputs:
 
 def _csv(found: Result) -> bytes:
     """The rows of an answer as comma-separated values."""
-    stream = io.StringIO()
-    csv.writer(stream, lineterminator="\n").writerows(found.rows())
-    return stream.getvalue().encode()
+    return csv_bytes(found.rows())

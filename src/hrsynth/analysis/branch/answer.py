@@ -128,7 +128,7 @@ class BranchPart(Value):
         at = np.asarray(q, dtype=float)
         return next((cell for cell in self.cells if cell.holds(at)), None)
 
-    told_turns = Shown(
+    turns_record = Shown(
         dict[str, bool],
         lambda self: dict(self.turns),
         As("turns"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import re
 import textwrap
 from collections.abc import Iterable, Sequence
@@ -22,6 +24,13 @@ LINE, LEAST = 100, 30
 """Columns of a table, and of its last column at least: beyond, that one is wrapped."""
 NAMES = 14
 """Columns before the values of an answer, at most."""
+
+
+def csv_bytes(rows: Iterable[Iterable[Any]]) -> bytes:
+    """Rows, their heads first, as comma-separated values."""
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\n").writerows(rows)
+    return stream.getvalue().encode()
 
 
 def width(text: str) -> int:
