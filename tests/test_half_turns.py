@@ -306,6 +306,7 @@ def test_a_map_is_of_the_poses_that_were_wanted(robot: str) -> None:
     assert answers(robot, "located", 2, 0)["answered"] == 2
 
 
+@pytest.mark.slow
 def test_a_pose_out_of_reach_is_refused() -> None:
     assert answers("3rrr_m1", "reached", 3, 0) == {"PoseNotReached": 3}
 

@@ -11,6 +11,7 @@ import tokenize
 import tomllib
 from collections import Counter
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parents[1] / "src" / "hrsynth"
@@ -45,6 +46,7 @@ def code_lines(text: str) -> int:
     )
 
 
+@cache
 def counted() -> dict[str, Counter[str]]:
     """Lines of code and of other files by folder; the modules beside the folders are the folder ``top``."""
     found: dict[str, Counter[str]] = {"code": Counter(), "other": Counter()}

@@ -40,7 +40,7 @@ def test_what_is_listed_is_canonical_and_belongs_there(name):
         assert group(parse(text)) == name
 
 
-@pytest.mark.some(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SMALL_FIRST)
 def test_a_motor_changes_no_leg_s_label(name):
     for word in map(parse, listed()[name]):

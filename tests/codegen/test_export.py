@@ -253,6 +253,7 @@ def test_limits_of_joints_without_a_motor(lower: float | None, upper: float | No
     assert found.to_dict()["limits"] == [limit.to_dict()]
 
 
+@pytest.mark.slow
 def test_motors_that_the_box_takes_beyond_their_limits_are_told() -> None:
     robot = four_bar()
     limited = robot.changed(

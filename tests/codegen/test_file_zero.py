@@ -240,7 +240,7 @@ def test_the_cpp_of_it_answers_the_same(name: str, tmp_path: Path):
         np.testing.assert_allclose(rows[good, column : column + expected.shape[1]], expected[good], atol=1e-11)
 
 
-@pytest.mark.some(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["palletizer", "limited knee", "follower"])
 def test_ranges_are_those_of_the_file(name: str, tmp_path: Path):
     """Without a box that is asked for motors go from limit to limit, as the file has them."""

@@ -114,7 +114,7 @@ def as_printed(answer: Singularity, state: Array, oracle: Oracle) -> float:
     return float(np.linalg.det(terms(*(values[str(each)] for each in sorted(total.free_symbols, key=str)))))
 
 
-@pytest.mark.some(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("turns", [(0.3, 2.5), (0.3, 2.5, -1.9)])
 def test_tips_that_leave_the_plane_of_motion_have_no_lines_in_it(turns: tuple[float, ...]) -> None:
     """The cranks' ends move in upright planes: what is printed vanishes with the rank of all screws, there alone."""

@@ -153,6 +153,7 @@ def test_limits_of_joints_that_are_joined_are_said_to_be_left_out():
     assert run.to_dict()["unlimited"] == ["s_ring"]
 
 
+@pytest.mark.slow
 def test_limits_of_two_turns_that_are_one_joint_are_kept():
     """Two R that meet at right angles are one U, whose turns are computed here from how the barrel is turned."""
     robot, first, along = knuckles()

@@ -82,6 +82,7 @@ def test_verdicts_are_those_of_legs() -> None:
         assert each.verdict == "controllable" or (each.discarded or "").startswith(each.verdict)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("watched", ["1,4", pytest.param("2,3", marks=pytest.mark.slow)])
 def test_answers_are_those_of_the_single_commands(watched: str) -> None:
     robot = load("quattro")

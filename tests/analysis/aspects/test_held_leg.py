@@ -116,6 +116,7 @@ def test_the_curve_is_where_two_modes_meet(drawn: HeldLegSection):
             assert max(abs(value), abs(first)) < 1e-4 * max(1.0, abs(second), abs(third))
 
 
+@pytest.mark.slow
 def test_the_number_of_modes_changes_at_the_curve_alone(drawn: HeldLegSection):
     """Neighbouring directions with different numbers of modes are apart from the curve's image by a cell at most."""
     ticks = np.linspace(-np.pi, np.pi, 73)

@@ -73,6 +73,7 @@ def test_motors_stay_where_passive_joints_close_the_loops(seed: int, tmp_path: P
     assert robot.joints["knee"].offset is not None
 
 
+@pytest.mark.slow
 def test_what_no_assembly_allows_is_not_mended(tmp_path: Path):
     """The rocker may only point away from the crank: closed beyond its limits, and the file stays as it is."""
     path = press(tmp_path, 0, 1)

@@ -394,6 +394,7 @@ def test_letters_of_ends_that_are_near_each_other_are_apart(marks: list[tuple[fl
     assert min(np.linalg.norm(a - b) for a in letters for b in places) > 9
 
 
+@pytest.mark.slow
 def test_a_servo_run_takes_the_example_of_each_end_and_ends_there():
     """The platform's turn follows from x and y: an example that says another one is refused."""
     found = hrsynth.basins("rrrrr_m1", to="x=0.02,y=0.15", grid="x=-0.01:0.24:2,y=-0.08:0.1:2", jobs=1)

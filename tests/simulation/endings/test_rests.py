@@ -151,6 +151,7 @@ def test_rests_are_found_as_far_as_slides_go(tmp_path: Path):
     assert all(case.count(slides, turn, poses) == 1 for slides, turn in within)
 
 
+@pytest.mark.slow
 def test_the_order_of_rests_is_that_of_what_they_are():
     """Not of how they were found, nor of the last digits of their errors, which differ between libraries."""
     found, rng = listed(), np.random.default_rng(0)
