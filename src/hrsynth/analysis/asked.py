@@ -1,4 +1,5 @@
-"""The configurations of the poses that a question names: by parts of the pose, or by the number of a mode."""
+"""The configurations of the poses that a question names: by parts of the pose, by coordinates of joints, or by the
+number of a mode."""
 
 from __future__ import annotations
 
@@ -9,9 +10,10 @@ from typing import TYPE_CHECKING
 from ..batch.reach import reach
 from ..errors import BadRequest, HrsynthError, PoseNotReached
 from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.joint_coordinates import reach_joints
 from ..kinematics.locked import rezero
 from ..mechanism.model import Mechanism
-from ..mechanism.pose import ModeNumber, Pose, PoseLike, asked_pose
+from ..mechanism.pose import AskedPose, JointPose, ModeNumber, Pose, PoseLike, asked_pose
 from ..options import require_range
 from ..results import with_spelling
 from ..tolerances import AS_PRINTED
@@ -41,8 +43,8 @@ def observe(
     metres, radians or ``deg``). ``see`` holds other observations, ``[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius``
     (:mod:`hrsynth.mechanism.observations`), which replace all legs if ``legs`` is None. ``at`` is a pose that
     replaces the zero configuration: on the same branch if that reaches the pose, otherwise in another operation
-    mode that was met; or a mode of the zero configuration with what is watched, ``mode:2``, at which ``modes``
-    found the robot assembled.
+    mode that was met; coordinates of joints or motors (``motors:0.1,0.2``); or a mode of the zero configuration with
+    what is watched, ``mode:2``, at which ``modes`` found the robot assembled.
 
     Raises ``BadRequest`` for unknown labels, links, parts of a pose and modes, ``PoseNotReached``.
 
@@ -94,7 +96,7 @@ def _start_at(setting: ObservedRobot, wanted: Pose) -> ClosedConfiguration:
 
 
 def configurations_at(
-    setting: ObservedRobot, poses: Sequence[Pose | ModeNumber], by_modes: bool = False
+    setting: ObservedRobot, poses: Sequence[AskedPose], by_modes: bool = False
 ) -> list[ClosedConfiguration]:
     """The robot at each of the poses, as :func:`asked_at`; raises ``PoseNotReached`` for the first not reached."""
     found = asked_at(setting, poses, by_modes)
@@ -105,7 +107,7 @@ def configurations_at(
 
 
 def asked_at(
-    setting: ObservedRobot, poses: Sequence[Pose | ModeNumber], by_modes: bool = False
+    setting: ObservedRobot, poses: Sequence[AskedPose], by_modes: bool = False
 ) -> list[ClosedConfiguration | PoseNotReached]:
     """The robot at each of the poses, or why it does not get there. ``mode:3`` is the third mode, with the directions
     that are watched, of the first pose among these that is given by its parts (of the zero configuration where none
@@ -118,16 +120,19 @@ def asked_at(
         return []
     require_platform(setting.robot, poses[0])
     everything, motion = setting.everything, setting.motion
-    found: dict[Pose | ModeNumber, ClosedConfiguration | PoseNotReached] = {}
+    found: dict[AskedPose, ClosedConfiguration | PoseNotReached] = {}
     for each in poses:
-        if isinstance(each, Pose):
+        if not isinstance(each, ModeNumber):
             try:
-                found[each] = reach(everything.start, everything.question, each, motion)
+                if isinstance(each, JointPose):
+                    found[each] = reach_joints(setting.robot, everything.start, motion, each)
+                else:
+                    found[each] = reach(everything.start, everything.question, each, motion)
             except PoseNotReached as error:
                 found[each] = error
     reached = [at for at in found.values() if isinstance(at, ClosedConfiguration)]
     about = next(iter(reached if by_modes else found.values()), everything.start)
-    unreached = {each: at for each, at in found.items() if isinstance(at, PoseNotReached)}
+    unreached = {each: at for each, at in found.items() if isinstance(at, PoseNotReached) and isinstance(each, Pose)}
     if isinstance(about, PoseNotReached):
         reason = f"it would be a mode at {about.pose}, which is not reached"
         return [
@@ -141,7 +146,7 @@ def asked_at(
             try:
                 if isinstance(each, ModeNumber):
                     found[each] = at_mode(listed, each)
-                elif by_modes and each in unreached:
+                elif by_modes and isinstance(each, Pose) and each in unreached:
                     found[each] = _assembled_mode(listed, each, unreached[each])
             except PoseNotReached as error:
                 found[each] = error

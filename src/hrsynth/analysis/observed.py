@@ -28,7 +28,7 @@ from ..mechanism.noise import Noise
 from ..mechanism.normal import NormalForm, normal_form
 from ..mechanism.observation import ObservationRecord, labels_of
 from ..mechanism.observations.direction import Direction
-from ..mechanism.pose import RADIANS, ModeNumber, Pose, PoseForm, PoseLike
+from ..mechanism.pose import RADIANS, AskedPose, Pose, PoseForm, PoseLike
 from ..mechanism.sensors import default_observation, defaults_of, encoders, observation_of, reason
 from ..options import WATCHING, option
 from ..progress import tell
@@ -219,7 +219,7 @@ class ObservedRobot(Value):
         """What the platform generically does."""
         return replace(PlatformMotion.of(self.configurations, self.everything.question), form=self.form)
 
-    def telling(self, poses: Iterable[Pose | ModeNumber]) -> ObservedRobot:
+    def telling(self, poses: Iterable[AskedPose]) -> ObservedRobot:
         """The same, all that is known of it kept, which tells poses in the manner of these."""
         form = PoseForm.of(poses)
         if form == self.form:
@@ -397,7 +397,10 @@ NoiseLike = Annotated[
 ]
 Jobs = Annotated[int | None, option("Processes (default: one per core).", low=1)]
 """What many questions are asked with."""
-POSES = "or mode:2 of the list that modes gives; repeat for more (default: the zero configuration)."
+POSES = (
+    "or motors:0.1,0.2, or joints:NAME=0.3, or mode:2 of the list that modes gives; repeat for more "
+    "(default: the zero configuration)."
+)
 POINTS = (
     "--camera eye=base@0.3,0.1,0 --see point:platform@0.1,0,0 --see point:platform@-0.1,0.1,0 "
     "--see point:platform@0,0.1,0.1"

@@ -11,6 +11,7 @@ import numpy as np
 from ..budgets import REMEMBERED
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.joint_coordinates import OfConfiguration
 from ..kinematics.limits import flat_wrists, outside
 from ..kinematics.relation import Relation, relation, relation_of
 from ..mechanism.pose import Pose
@@ -90,7 +91,7 @@ class Constraint(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Posture(Value):
+class Posture(OfConfiguration, Value):
     """All that is said of one configuration."""
 
     configuration: ClosedConfiguration

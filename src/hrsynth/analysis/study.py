@@ -12,7 +12,7 @@ from math import ceil
 from typing import Any
 
 from ..errors import BadRequest, HrsynthError
-from ..mechanism.pose import ModeNumber, Pose, PoseLike, asked_poses
+from ..mechanism.pose import AskedPose, PoseLike, asked_poses
 from ..processes import run_shared
 from ..progress import tell
 from ..results import Result, brief
@@ -116,7 +116,7 @@ def _answer_part(function: Callable[..., Any], errors: str, part: list[Given]) -
 
 
 def _describe(value: Any) -> str:
-    return str(value) if isinstance(value, Pose | ModeNumber | tuple) else brief(value)
+    return str(value) if isinstance(value, AskedPose | tuple) else brief(value)
 
 
 def _place(function: Callable[..., Any]) -> str:

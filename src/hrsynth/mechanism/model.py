@@ -278,6 +278,8 @@ class Mechanism(Result, shown_as="robot"):
     """How the platform was chosen; None in a mechanism that was read from no file."""
     scale: float | None = field(default=None, compare=False)
     """The characteristic length (m) of the robot whose zero configuration was moved; None where it was not."""
+    written: Mechanism | None = field(default=None, compare=False)
+    """Of a normal form the robot as its file has it; None where they are the same."""
 
     def headline(self) -> str:
         """The name, and the number of its parts."""

@@ -48,6 +48,8 @@ def normal_form(mechanism: Mechanism) -> NormalForm:
         moved += sum(_moved_by(each, joint, mechanism.length) for each in gone)
         made_of[_first(current, gone)] = tuple(name for each in gone for name in made_of.pop(each.name, (each.name,)))
         current = _replace_joint(current, between, gone, joint)
+    if current is not mechanism:
+        current = replace(current, written=mechanism)
     return NormalForm(current, into, moved, made_of)
 
 

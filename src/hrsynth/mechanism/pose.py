@@ -99,7 +99,7 @@ class PoseForm:
     degrees: bool = False
 
     @classmethod
-    def of(cls, poses: Iterable[Pose | ModeNumber]) -> PoseForm:
+    def of(cls, poses: Iterable[AskedPose]) -> PoseForm:
         """The form in which these poses are written."""
         typed = [each for each in poses if isinstance(each, Pose)]
         return cls(
@@ -121,6 +121,58 @@ class ModeNumber:
         return f"mode:{self.number}"
 
 
+@dataclass(frozen=True)
+class JointPose:
+    """Coordinates of joints in place of a pose, counted as the file counts them (m, rad): written
+    ``joints:knee=0.3,hip=5deg``, or ``motors:0.1,0.2`` in the order of the file. Motors that are not named stay as they
+    are at the zero configuration; other joints move as the loops ask."""
+
+    motors: bool
+    values: tuple[tuple[str, tuple[float, ...]], ...]
+    """By name; without names (empty) in the order of the file."""
+
+    @classmethod
+    def of(cls, kind: str, given: Any) -> JointPose:
+        """Those of ``joints`` or ``motors``, given as a text, as a dict by names, or in the order of the file; raises
+        ``BadRequest``."""
+        named = isinstance(given, Mapping)
+        try:
+            if isinstance(given, str):
+                parts = [part.rpartition("=") for part in given.split(",")]
+                named = all(equals for _, equals, _ in parts)
+                if not named and any(equals for _, equals, _ in parts):
+                    raise ValueError
+                pairs = [(name.strip(), tuple(map(_coordinate, value.split("/")))) for name, _, value in parts]
+            else:
+                found = given.items() if named else (("", value) for value in given)
+                pairs = [(str(name), tuple(map(float, np.atleast_1d(value)))) for name, value in found]
+        except (TypeError, ValueError):
+            raise BadRequest(f"{kind} of a pose", given, JOINT_POSES) from None
+        names = [name for name, _ in pairs if named]
+        if not pairs or len(set(names)) < len(names) or not np.isfinite([x for _, part in pairs for x in part]).all():
+            raise BadRequest(f"{kind} of a pose: finite values, each name once", given, JOINT_POSES)
+        return cls(kind == "motors", tuple(pairs))
+
+    @property
+    def kind(self) -> str:
+        """``motors`` or ``joints``."""
+        return "motors" if self.motors else "joints"
+
+    def __str__(self) -> str:
+        parts = ((name and f"{name}=") + "/".join(map(_write_number, each)) for name, each in self.values)
+        return f"{self.kind}:{','.join(parts)}"
+
+
+def _coordinate(text: str) -> float:
+    """A coordinate as it is typed: metres, radians, or degrees with ``deg``."""
+    digits = text.strip().removesuffix("deg")
+    number: float = plain_number(digits)
+    return math.radians(number) if text.strip() != digits else number
+
+
+JOINT_POSES = "joints:NAME=VALUE,… or motors:VALUE,VALUE,… in the order of the file (m, rad, or degrees with deg)"
+
+
 class RigidTransform(Protocol):
     """What has a homogeneous matrix, as ``pinocchio.SE3``."""
 
@@ -128,9 +180,10 @@ class RigidTransform(Protocol):
     def homogeneous(self) -> Array: ...
 
 
-PoseLike = Pose | ModeNumber | str | Mapping[str, Any] | ArrayLike | RigidTransform
+AskedPose = Pose | ModeNumber | JointPose
+PoseLike = AskedPose | str | Mapping[str, Any] | ArrayLike | RigidTransform
 """A pose as a user gives it: a text, a dict of its parts, x y z (roll pitch yaw), a matrix (4, 4), an SE3 of
-Pinocchio."""
+Pinocchio; coordinates as ``{"joints": {"knee": 0.3}}`` or ``{"motors": [0.1, 0.2]}``, in the order of the file."""
 POSES = (
     f"a text such as {EXAMPLE}; a dict of these; numbers x, y, z or x, y, z, roll, pitch, yaw; a 4 × 4 matrix; "
     "a pinocchio.SE3"
@@ -175,12 +228,12 @@ def _as_text(value: Any) -> str:
     return repr(float(value)) if np.ndim(value) == 0 else "/".join(map(_as_text, value))
 
 
-def asked_poses(given: PoseLike | Iterable[PoseLike] | None) -> list[Pose | ModeNumber]:
+def asked_poses(given: PoseLike | Iterable[PoseLike] | None) -> list[AskedPose]:
     """The poses that are given, one or several; raises ``BadRequest``."""
     if given is None:
         return []
     several: Any = given
-    if isinstance(given, str | bytes | bytearray | Pose | ModeNumber | Mapping) or hasattr(given, "homogeneous"):
+    if isinstance(given, str | bytes | bytearray | AskedPose | Mapping) or hasattr(given, "homogeneous"):
         several = [given]
     elif not isinstance(given, Iterable) or (isinstance(given, np.ndarray) and given.ndim == 0):
         raise BadRequest("poses", given, f"one or several of: {POSES}")
@@ -193,13 +246,17 @@ def asked_poses(given: PoseLike | Iterable[PoseLike] | None) -> list[Pose | Mode
     return [asked_pose(each) for each in several]
 
 
-def asked_pose(given: PoseLike) -> Pose | ModeNumber:
-    """The pose that is given, by its parts or as ``mode:3``; raises ``BadRequest``."""
-    if isinstance(given, ModeNumber):
+def asked_pose(given: PoseLike) -> AskedPose:
+    """The pose that is given, by its parts, as ``mode:3`` or by coordinates of joints; raises ``BadRequest``."""
+    if isinstance(given, ModeNumber | JointPose):
         return given
+    if isinstance(given, Mapping) and len(given) == 1 and (kind := next(iter(given))) in ("joints", "motors"):
+        return JointPose.of(kind, given[kind])
     if not isinstance(given, str):
         return as_pose(given)
     name, colon, number = given.strip().partition(":")
+    if colon and name in ("joints", "motors"):
+        return JointPose.of(name, number)
     if not colon or name != "mode":
         return Pose.parse(given)
     if not (number.isascii() and number.isdecimal()) or int(number) < 1:

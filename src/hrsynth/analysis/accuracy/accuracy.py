@@ -11,7 +11,7 @@ from ...budgets import LARGEST_FIELD, LARGEST_SWEEP
 from ...errors import BadRequest
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
-from ...mechanism.pose import Grid, ModeNumber, Pose, PoseLike, as_pose, asked_poses
+from ...mechanism.pose import AskedPose, Grid, PoseLike, as_pose, asked_poses
 from ...options import option
 from ...progress import tell
 from ...records import DEG, FLAT, As, Shown, recorded
@@ -171,7 +171,7 @@ def accuracy(
     >>> hrsynth.accuracy("3rrr_m1", cone="0.1deg", at="x=0,y=0,phi=0")
     <Accuracy: 3rrr_m1, watching 1, 2, 3: 0.414 mm at x=0,y=0,z=0,phi=0deg>
     """
-    wanted: list[Pose | ModeNumber] = asked_poses(at)
+    wanted: list[AskedPose] = asked_poses(at)
     if plane is not None and grid is not None:
         raise BadRequest("both a plane and a grid are given", f"{plane} and {grid}", "one of them")
     if steps is not None and plane is None:

@@ -14,10 +14,11 @@ from ...constraints.condition import Condition, Named
 from ...constraints.pattern import ConstraintPattern
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.joint_coordinates import OfConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.steps import lead_to, track
 from ...mechanism.observation import Observation
-from ...mechanism.pose import ModeNumber, Pose, PoseLike, asked_pose
+from ...mechanism.pose import AskedPose, ModeNumber, Pose, PoseLike, asked_pose
 from ...options import option
 from ...progress import tell
 from ...records import As, Recorded, Shown, recorded
@@ -38,7 +39,7 @@ from .words import SAME, SEPARATED, UNDECIDED
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PathEnd(Value):
+class PathEnd(OfConfiguration, Value):
     """A requested pose: the whole pose that is reached, the configuration in which it is, and the value of the
     condition there; at the goal of a path the value in the working modes in which the path ends."""
 
@@ -512,7 +513,7 @@ def path(
 
 
 def between_poses(
-    setting: ObservedRobot, wanted: Sequence[Pose | ModeNumber], *, any_mode: bool, seed: int = 0, budget: int = BUDGET
+    setting: ObservedRobot, wanted: Sequence[AskedPose], *, any_mode: bool, seed: int = 0, budget: int = BUDGET
 ) -> PathAnswer:
     """What :meth:`Aspects.join` says of the configurations at a start and a goal."""
     aspects = Aspects.of(setting.telling(wanted), seed=seed)

@@ -12,6 +12,7 @@ from ...geometry.vectors import Array, pose_difference
 from ...kinematics.assembly import NOT_FOUND, Assembler, Assembly, of_links
 from ...kinematics.closures import Miss
 from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.joint_coordinates import OfConfiguration
 from ...kinematics.limits import outside
 from ...kinematics.relation import Measurement, relation
 from ...kinematics.tasks import Held
@@ -33,7 +34,7 @@ class LegMissed(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class AssemblyMode(Record):
+class AssemblyMode(OfConfiguration, Record):
     """A pose of the platform with the measurements of the goal.
 
     The exact pose, of the file's decimals, is within ``shift`` (m) and ``turn`` (rad) of ``pose``, infinite if nothing

@@ -19,12 +19,13 @@ from ...kinematics.limits import outside
 from ...kinematics.relation import Measurement
 from ...kinematics.tasks import Task
 from ...mechanism.observation import Observation
-from ...mechanism.pose import ModeNumber, Pose, PoseLike, asked_pose
+from ...mechanism.pose import JointPose, ModeNumber, Pose, PoseLike, asked_pose
 from ...options import option
 from ...progress import tell
 from ...records import FLAT, OPTIONAL, As, Shown, recorded
 from ...results import Result
 from ...tolerances import MEASUREMENT_BOUND, SAME_NEAR_POSE
+from ..asked import configurations_at
 from ..formation import Formation
 from ..measured import MeasuredRobot
 from ..observed import POINTS, UNLIMITED, CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SeeLike
@@ -295,6 +296,8 @@ def modes(
     asked = None if at is None or isinstance(at, ClosedConfiguration) else asked_pose(at)
     if isinstance(asked, ModeNumber):
         at, asked = at_mode(modes(setting), asked), None
+    elif isinstance(asked, JointPose):
+        (at,), asked = configurations_at(setting, [asked]), None
     setting = setting if asked is None else setting.telling([asked])
     motion, wanted = setting.motion, None
     goal = at if isinstance(at, ClosedConfiguration) else setting.everything.start

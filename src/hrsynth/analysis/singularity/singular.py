@@ -12,6 +12,7 @@ from ...constraints.pattern import ConstraintPattern
 from ...constraints.turning import unexamined_poses
 from ...errors import BadRequest
 from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.joint_coordinates import OfConfiguration
 from ...kinematics.relation import Measurement, platform_motions, relation
 from ...kinematics.tasks import solve
 from ...mechanism.pose import Pose
@@ -33,7 +34,7 @@ EXAMPLES = 3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Example(Value):
+class Example(OfConfiguration, Value):
     """A singular pose constructed from the condition: the freedoms lost there, Pinocchio's smallest singular value
     there, and the largest a centimetre away."""
 

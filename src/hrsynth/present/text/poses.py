@@ -21,12 +21,12 @@ from .tables import (
     GAP,
     NOT_BOUNDED,
     Rows,
-    beyond_limits,
     camera,
     describe_watched,
     dropped_limits,
     head,
     is_bounded,
+    joint_rows,
     known_row,
     listing,
 )
@@ -111,7 +111,7 @@ def _posture(posture: Posture, length: float, setting: ObservedRobot) -> Rows:
     mobility, far, dof = posture.mobility, posture.distances, posture.dof
     whose = "bodies have" if setting.mechanism.formation else "platform has"
     rows = [
-        *beyond_limits(posture.beyond),
+        *joint_rows(posture.coordinates, posture.beyond),
         *(
             (
                 "flat wrist",
@@ -397,6 +397,7 @@ def proof_words(mode: AssemblyMode) -> str:
 def at_mode(mode: AssemblyMode, found: AssemblyModes) -> list[str]:
     """What the real robot does at a mode of a list."""
     there, hidden = assembly(mode, found.setting.unlimited), found.kind == "hidden"
+    there += [f"{name} {told}" for name, told in joint_rows(mode.coordinates)]
     if mode.type2_distance is None:
         seen = NO_MATRIX if hidden else "the motors can move there while the platform rests"
         return [*there, *[seen] * (mode.configuration is not None)]
@@ -438,7 +439,9 @@ def path(found: PathAnswer) -> str:
     rows = [
         *head(found.setting),
         ("from", f"{found.start.pose}   ({value} {found.start.value:.4g})"),
+        *joint_rows(found.start.coordinates),
         ("to", f"{found.goal.pose}   ({value} {found.goal.value:.4g})"),
+        *joint_rows(found.goal.coordinates),
         *known_row("", "start and goal are the same pose: there is no path to find" if found.stays else None),
         ("verdict", [f"{found.verdict} ({'certified' if found.certified else 'not certified'})", found.reason]),
     ]

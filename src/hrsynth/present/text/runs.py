@@ -17,11 +17,11 @@ from .tables import (
     GAP,
     NOT_BOUNDED,
     Rows,
-    beyond_limits,
     camera,
     dropped_limits,
     head,
     is_bounded,
+    joint_rows,
     known_row,
     label_of,
     listing,
@@ -72,6 +72,7 @@ def servo(found: Servo) -> str:
         *GAP,
         ("ended", [f"{found.ended} after {run.times[-1]:.3g} s", found.ending.reason]),
         ("at", str(found.pose)),
+        *joint_rows(found.coordinates),
     ]
     if found.ended != "goal":
         rows.append(("", f"{1e3 * off[0]:.4g} mm and {_degrees(off[1])} degrees from the goal"))
@@ -210,7 +211,7 @@ def accuracy(found: Accuracy) -> str:
         rows += [
             *GAP,
             ("pose", str(errors.pose)),
-            *beyond_limits(errors.beyond),
+            *joint_rows(errors.coordinates, errors.beyond),
             *_extent("position", errors.position, 1e3, "mm", length),
             *_extent("orientation", errors.orientation, 180 / np.pi, "degrees"),
             *([] if true is None else _samples(errors, true)),

@@ -13,6 +13,7 @@ from ...analysis.observed import ObservedRobot
 from ...geometry.vectors import Array
 from ...kinematics.assembly import ASSEMBLED, BEYOND
 from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.joint_coordinates import OfConfiguration
 from ...mechanism.pose import Pose
 from ...records import FLAT, As, Number, Record, Recorded, Shown, recorded
 from ...results import Result, Value
@@ -29,7 +30,7 @@ MOST_JOINED, PLACES_TOLD = 5000, 4
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RestPoint(Record):
+class RestPoint(OfConfiguration, Record):
     """A pose at which the loop rests: ``kind`` goal, mode, antipodal or critical (‖e‖ = ``error`` > 0 and no command),
     ``stability`` stable (it attracts), saddle, unstable (nothing is drawn to it) or undecided; ``curvatures`` are the
     eigenvalues of the Hessian of ½ ‖e‖² along the motions of the loops (characteristic lengths, radians), ascending.

@@ -1,0 +1,229 @@
+"""Coordinates of a file's joints at a closed configuration, and closed configurations by these coordinates.
+
+They count as the file counts: from its zero, in its sense, metres and radians, turns not modulo 2π. Balls, planar and
+free joints have none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import qr
+
+from ..errors import BadRequest, LoopsNotClosed, PoseNotReached
+from ..geometry.ranks import range_basis
+from ..geometry.vectors import Array
+from ..mechanism import Joint, JointType, Mechanism
+from ..mechanism.pose import JointPose
+from ..records import Record, recorded
+from ..results import Value
+from ..tolerances import AS_PRINTED, CLOSED, SAME_POINT, SOLVED
+from .assembly import of_links
+from .configuration import ClosedConfiguration
+from .limits import Stops
+from .pinocchio_model import PinocchioModel
+from .platform_motion import PlatformMotion
+from .steps import STRIDE, track
+from .tasks import LinkPoses, solve
+
+COUNTED = (JointType.REVOLUTE, JointType.PRISMATIC, JointType.UNIVERSAL, JointType.CYLINDRICAL)
+"""The joints that have coordinates here: a slide before a turn, turns in the order of the axes."""
+
+
+def counted_joints(robot: Mechanism, motors: bool = False) -> list[Joint]:
+    """The joints of a robot that have coordinates, or only its motors, in the order of the file."""
+    return [each for each in robot.joints.values() if each.type in COUNTED and (each.actuated or not motors)]
+
+
+def read_joints(at: ClosedConfiguration) -> dict[str, tuple[float, ...]]:
+    """The coordinates of the joints of a robot, as its file has them, at a configuration of it or of its normal form.
+
+    Where the normal form has made one joint of several, theirs are found from the poses of the links that are left;
+    none are told where these do not fit.
+    """
+    twin, q = at.twin, at.q
+    robot = twin.mechanism.written or twin.mechanism
+    if not all(joint.name in twin.coordinates for joint in counted_joints(robot)):
+        twin = PinocchioModel(robot, twin.length)
+        kept = tuple((link, at.pose(link)) for link in robot.links if link in at.twin.mechanism.links)
+        q, residual = solve(twin, twin.q0, LinkPoses(kept), tolerance=SOLVED, iterations=100)
+        if residual > CLOSED:
+            return {}
+    step = twin.difference(twin.q0, q)
+    return {
+        each.name: tuple((step[list(twin.coordinates[each.name])] * _units(each, twin.length) + _offset(each)).tolist())
+        for each in counted_joints(twin.mechanism)
+    }
+
+
+def _units(joint: Joint, length: float) -> Array:
+    """What the coordinates are counted in (m, rad)."""
+    if joint.type is JointType.CYLINDRICAL:
+        return np.array([length, 1.0])
+    return np.full(joint.type.freedoms, length if joint.type.slides else 1.0)
+
+
+def _offset(joint: Joint) -> Array:
+    """The file's coordinates at the zero configuration."""
+    return np.zeros(joint.type.freedoms) if joint.offset is None else joint.offset
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class JointAim(Value):
+    """Coordinates of a twin (by their ``places`` in its velocities) that are wanted, from ``begun`` where a way to them
+    starts; characteristic lengths, radians."""
+
+    places: tuple[int, ...]
+    begun: Array
+    values: Array
+
+    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
+        """Error (reached − wanted) and its Jacobian."""
+        places = list(self.places)
+        return twin.difference(twin.q0, q)[places] - self.values, np.eye(twin.nv)[places]
+
+    def towards(self, X: Array, fraction: float) -> JointAim:
+        """What lies ``fraction`` of the way; the platform's pose X (4, 4) says nothing here."""
+        return self if fraction == 1 else replace(self, values=self.begun + fraction * (self.values - self.begun))
+
+
+def reach_joints(
+    robot: Mechanism, start: ClosedConfiguration, motion: PlatformMotion, asked: JointPose
+) -> ClosedConfiguration:
+    """The configuration with these coordinates that small steps lead to from ``start`` on its branch, all joints within
+    their limits.
+
+    ``start`` is the zero configuration of ``robot`` in its own joints or in normal form; coordinates that depend on
+    others must agree with them. Raises ``BadRequest`` for unknown joints, their number and values beyond limits,
+    ``PoseNotReached`` where the way ends before, saying which joint stops it.
+    """
+    wanted = _wanted(robot, asked)
+    twin, home = start.twin, start
+    if not all(joint.name in twin.coordinates for joint in counted_joints(robot)):
+        twin = PinocchioModel(robot, twin.length)
+        home = ClosedConfiguration.of(twin, twin.q0)
+    found = _lead(home, motion, _Wanted.of(twin, wanted), asked)
+    if twin is start.twin:
+        return found
+    try:
+        return of_links(start.twin, found.pose)
+    except LoopsNotClosed as error:
+        raise PoseNotReached(robot.name, str(asked), 1.0, "", reason=f"in normal form: {error}") from None
+
+
+def _wanted(robot: Mechanism, asked: JointPose) -> dict[str, tuple[float, ...]]:
+    """The coordinates by name: those that are asked for, and those of motors that stay."""
+    joints = {joint.name: joint for joint in counted_joints(robot, asked.motors)}
+    sizes = {name: joint.type.freedoms for name, joint in joints.items()}
+    given = dict(asked.values)
+    if "" in given:
+        flat = [x for _, part in asked.values for x in part]
+        if len(flat) != sum(sizes.values()):
+            raise BadRequest(f"{robot.name}: number of {asked.kind}", len(flat), f"{sum(sizes.values())}: {[*joints]}")
+        ends = np.cumsum([0, *sizes.values()])
+        given = {name: tuple(flat[i:j]) for name, i, j in zip(joints, ends, ends[1:], strict=False)}
+    for name, values in given.items():
+        if name not in joints:
+            raise BadRequest(f"{robot.name}: unknown among its {asked.kind}", name, [*joints] or "none is there")
+        if len(values) != sizes[name]:
+            raise BadRequest(f"{robot.name}: coordinates of {name}", "/".join(map(str, values)), str(sizes[name]))
+        lower, upper = robot.limited.get(name, (-np.inf, np.inf))
+        value, offset = values[0], float(_offset(joints[name])[0])
+        if not lower - SAME_POINT <= value - offset <= upper + SAME_POINT:
+            low, high = lower + offset, upper + offset
+            raise BadRequest(f"{robot.name}: {name} beyond its limits", value, f"{low:.6g} to {high:.6g}")
+    stay = {name: tuple(_offset(joint).tolist()) for name, joint in joints.items()} if asked.motors else {}
+    return {**stay, **given}
+
+
+@dataclass(frozen=True, eq=False)
+class _Wanted:
+    """Coordinates of a twin that are wanted: names, places and values, one for each number."""
+
+    names: tuple[str, ...]
+    places: tuple[int, ...]
+    values: Array
+
+    @classmethod
+    def of(cls, twin: PinocchioModel, wanted: Mapping[str, tuple[float, ...]]) -> _Wanted:
+        joints = [twin.mechanism.joints[name] for name in wanted]
+        values = [(np.array(wanted[joint.name]) - _offset(joint)) / _units(joint, twin.length) for joint in joints]
+        names = tuple(joint.name for joint in joints for _ in range(joint.type.freedoms))
+        return cls(names, tuple(i for joint in joints for i in twin.coordinates[joint.name]), np.concatenate(values))
+
+    def chosen(self, some: Array) -> _Wanted:
+        """Some of them, by number."""
+        return _Wanted(tuple(self.names[i] for i in some), tuple(self.places[i] for i in some), self.values[some])
+
+
+def _lead(home: ClosedConfiguration, motion: PlatformMotion, wanted: _Wanted, asked: JointPose) -> ClosedConfiguration:
+    """Steps from the zero configuration to coordinates, as many of them at a time as can be chosen one by one."""
+    twin, name = home.twin, home.twin.mechanism.name
+    rows = np.eye(twin.nv)[list(wanted.places)] @ home.kernel()[0]
+    rank = range_basis(rows, 1.0)[1].value
+    free = wanted.chosen(np.sort(qr(rows.T, mode="r", pivoting=True)[1][:rank]))
+    begun = twin.difference(twin.q0, home.q)[list(free.places)]
+    aim, stops = JointAim(free.places, begun, free.values), Stops.of(twin, home.q)
+    before, here, came = stops.margins(twin, home.q), home, 0.0
+
+    def refuse(stopped: str) -> PoseNotReached:
+        last = ",".join(f"{each:.6g}" for each in twin.difference(twin.q0, here.q)[list(free.places)])
+        reason = f"{stopped}; from its zero configuration the robot gets {100 * came:.3g} % of the way"
+        return PoseNotReached(name, str(asked), came, last, reason=reason)
+
+    pieces = max(1, int(np.ceil(np.linalg.norm(free.values - begun) / STRIDE)))
+    for number in range(1, pieces + 1):
+        ahead = aim.towards(home.pose(motion.link), number / pieces)
+        there, part = track(here, motion, replace(ahead, begun=aim.towards(home.pose(motion.link), came).values))
+        over = {
+            joint: margin
+            for joint, margin in stops.margins(twin, there.q).items()
+            if margin < min(before[joint], 0.0) - SAME_POINT
+        }
+        if over:
+            raise refuse(f"{min(over, key=lambda joint: over[joint])} is at its limit")
+        here, came = there, (number - 1 + part) / pieces
+        if part < 1:
+            J = np.eye(twin.nv)[list(free.places)] @ here.kernel()[0]
+            held = free.names[int(np.argmax(np.abs(np.linalg.svd(J)[0][:, -1])))]
+            raise refuse(f"a singularity lies ahead, where {held} cannot go on with the others as they are")
+    missed = JointAim(wanted.places, wanted.values, wanted.values).rows(twin, here.q)[0]
+    worst = int(np.argmax(np.abs(missed)))
+    if abs(missed[worst]) > AS_PRINTED:
+        raise refuse(f"with the others as they are {wanted.names[worst]} is off by {abs(missed[worst]):.3g}")
+    return here
+
+
+Told = dict[str, float | tuple[float, ...]]
+"""Coordinates by joint: a number, or one for each axis."""
+
+
+@dataclass(frozen=True)
+class JointCoordinates(Record, all_recorded=True):
+    """Coordinates of the file's joints at a configuration (m, rad), counted from its zero: of the driven ones
+    (``motors``) and of the others."""
+
+    motors: Told
+    joints: Told
+
+    @classmethod
+    def of(cls, at: ClosedConfiguration) -> JointCoordinates:
+        """Those at a configuration."""
+        robot = at.twin.mechanism.written or at.twin.mechanism
+        found = {name: each[0] if len(each) == 1 else each for name, each in read_joints(at).items()}
+        driven = {name: value for name, value in found.items() if robot.joints[name].actuated}
+        return cls(driven, {name: value for name, value in found.items() if name not in driven})
+
+
+class OfConfiguration:
+    """What has a configuration, and tells the coordinates of its joints."""
+
+    configuration: ClosedConfiguration | None
+
+    @property
+    @recorded()
+    def coordinates(self) -> JointCoordinates | None:
+        """The coordinates of the file's joints; None without a configuration."""
+        return None if self.configuration is None else JointCoordinates.of(self.configuration)
