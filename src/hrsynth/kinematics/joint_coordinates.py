@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import qr
 
 from ..errors import BadRequest, LoopsNotClosed, PoseNotReached
 from ..geometry.ranks import range_basis
@@ -160,6 +159,8 @@ class _Wanted:
 
 def _lead(home: ClosedConfiguration, motion: PlatformMotion, wanted: _Wanted, asked: JointPose) -> ClosedConfiguration:
     """Steps from the zero configuration to coordinates, as many of them at a time as can be chosen one by one."""
+    from scipy.linalg import qr
+
     twin, name = home.twin, home.twin.mechanism.name
     rows = np.eye(twin.nv)[list(wanted.places)] @ home.kernel()[0]
     rank = range_basis(rows, 1.0)[1].value
@@ -188,7 +189,7 @@ def _lead(home: ClosedConfiguration, motion: PlatformMotion, wanted: _Wanted, as
         if part < 1:
             J = np.eye(twin.nv)[list(free.places)] @ here.kernel()[0]
             held = free.names[int(np.argmax(np.abs(np.linalg.svd(J)[0][:, -1])))]
-            raise refuse(f"a singularity lies ahead, where {held} cannot go on with the others as they are")
+            raise refuse(f"a singularity lies ahead, at which {held} stops")
     missed = JointAim(wanted.places, wanted.values, wanted.values).rows(twin, here.q)[0]
     worst = int(np.argmax(np.abs(missed)))
     if abs(missed[worst]) > AS_PRINTED:
@@ -201,7 +202,7 @@ Told = dict[str, float | tuple[float, ...]]
 
 
 @dataclass(frozen=True)
-class JointCoordinates(Record, all_recorded=True):
+class FileCoordinates(Record, all_recorded=True):
     """Coordinates of the file's joints at a configuration (m, rad), counted from its zero: of the driven ones
     (``motors``) and of the others."""
 
@@ -209,7 +210,7 @@ class JointCoordinates(Record, all_recorded=True):
     joints: Told
 
     @classmethod
-    def of(cls, at: ClosedConfiguration) -> JointCoordinates:
+    def of(cls, at: ClosedConfiguration) -> FileCoordinates:
         """Those at a configuration."""
         robot = at.twin.mechanism.written or at.twin.mechanism
         found = {name: each[0] if len(each) == 1 else each for name, each in read_joints(at).items()}
@@ -224,6 +225,6 @@ class OfConfiguration:
 
     @property
     @recorded()
-    def coordinates(self) -> JointCoordinates | None:
+    def coordinates(self) -> FileCoordinates | None:
         """The coordinates of the file's joints; None without a configuration."""
-        return None if self.configuration is None else JointCoordinates.of(self.configuration)
+        return None if self.configuration is None else FileCoordinates.of(self.configuration)

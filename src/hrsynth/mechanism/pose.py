@@ -142,10 +142,10 @@ class JointPose:
                 named = all(equals for _, equals, _ in parts)
                 if not named and any(equals for _, equals, _ in parts):
                     raise ValueError
-                pairs = [(name.strip(), tuple(map(_coordinate, value.split("/")))) for name, _, value in parts]
+                pairs = [(name.strip(), _coordinates(value)) for name, _, value in parts]
             else:
                 found = given.items() if named else (("", value) for value in given)
-                pairs = [(str(name), tuple(map(float, np.atleast_1d(value)))) for name, value in found]
+                pairs = [(str(name), _coordinates(value)) for name, value in found]
         except (TypeError, ValueError):
             raise BadRequest(f"{kind} of a pose", given, JOINT_POSES) from None
         names = [name for name, _ in pairs if named]
@@ -163,11 +163,12 @@ class JointPose:
         return f"{self.kind}:{','.join(parts)}"
 
 
-def _coordinate(text: str) -> float:
-    """A coordinate as it is typed: metres, radians, or degrees with ``deg``."""
-    digits = text.strip().removesuffix("deg")
-    number: float = plain_number(digits)
-    return math.radians(number) if text.strip() != digits else number
+def _coordinates(given: Any) -> tuple[float, ...]:
+    """The coordinates of one joint: numbers in metres or radians, or a text with / between, degrees with ``deg``."""
+    if not isinstance(given, str):
+        return tuple(map(float, np.atleast_1d(given)))
+    typed = [(part.strip(), part.strip().removesuffix("deg")) for part in given.split("/")]
+    return tuple(float(np.radians(plain_number(x))) if x != part else plain_number(x) for part, x in typed)
 
 
 JOINT_POSES = "joints:NAME=VALUE,… or motors:VALUE,VALUE,… in the order of the file (m, rad, or degrees with deg)"

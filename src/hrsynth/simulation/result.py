@@ -12,7 +12,7 @@ from ..analysis.observed import UNLIMITED, ObservedRobot
 from ..geometry.so3 import angle_of
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.joint_coordinates import JointCoordinates
+from ..kinematics.joint_coordinates import FileCoordinates
 from ..mechanism.noise import Noise
 from ..mechanism.pose import Pose
 from ..records import DEG, FLAT, MM, As, Record, Recorded, Shown, recorded
@@ -87,7 +87,7 @@ class Servo(Result, shown_as="servo"):
         """The pose at which it ended."""
         return self.pose_of(self.settled)
 
-    coordinates = Shown(JointCoordinates, lambda self: JointCoordinates.of(self.settled), "where it ended")
+    coordinates = Shown(FileCoordinates, lambda self: FileCoordinates.of(self.settled), "where it ended")
 
     def pose_of(self, at: ClosedConfiguration) -> Pose:
         """The platform's pose at a configuration."""

@@ -15,7 +15,7 @@ from ...batch.error_bounds import bounds_of_maps, freedom
 from ...geometry.ranks import kernel_basis
 from ...geometry.vectors import Array, orient_axis
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.joint_coordinates import JointCoordinates
+from ...kinematics.joint_coordinates import FileCoordinates
 from ...kinematics.limits import outside
 from ...kinematics.relation import Measurement, relation
 from ...mechanism.pose import Pose
@@ -72,7 +72,7 @@ class PoseErrors(Value, all_recorded=True):
     orientation: Annotated[ErrorEllipsoid, As("orientation_deg", scale=DEG)]
     beyond: tuple[str, ...] = ()
     """The joints that are beyond their limits at the pose."""
-    coordinates: JointCoordinates | None = None
+    coordinates: FileCoordinates | None = None
 
 
 def reading(at: ClosedConfiguration, question: Measurement) -> tuple[Array, Array]:
@@ -163,7 +163,7 @@ def _longest(axes: Array | None) -> float:
 def error_maxima(at: ClosedConfiguration, question: Measurement, blur: Blur, pose: Pose) -> PoseErrors:
     """The error maxima at a configuration with their directions."""
     position, orientation = map(_extent, _parts(at, question, blur))
-    return PoseErrors(pose, position, orientation, tuple(outside(at.twin, at.q)), JointCoordinates.of(at))
+    return PoseErrors(pose, position, orientation, tuple(outside(at.twin, at.q)), FileCoordinates.of(at))
 
 
 def _extent(part: ErrorMaps | None) -> ErrorEllipsoid:

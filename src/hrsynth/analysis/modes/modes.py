@@ -15,6 +15,7 @@ from ...constraints.pattern import placing_links
 from ...errors import BadRequest, MissingExtra, NotConfined, PoseNotReached, TooLarge, Unsolved
 from ...kinematics.assembly import Assembly, of_links
 from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.joint_coordinates import reach_joints
 from ...kinematics.limits import outside
 from ...kinematics.relation import Measurement
 from ...kinematics.tasks import Task
@@ -25,7 +26,6 @@ from ...progress import tell
 from ...records import FLAT, OPTIONAL, As, Shown, recorded
 from ...results import Result
 from ...tolerances import MEASUREMENT_BOUND, SAME_NEAR_POSE
-from ..asked import configurations_at
 from ..formation import Formation
 from ..measured import MeasuredRobot
 from ..observed import POINTS, UNLIMITED, CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SeeLike
@@ -297,7 +297,7 @@ def modes(
     if isinstance(asked, ModeNumber):
         at, asked = at_mode(modes(setting), asked), None
     elif isinstance(asked, JointPose):
-        (at,), asked = configurations_at(setting, [asked]), None
+        at, asked = reach_joints(setting.robot, setting.everything.start, setting.motion, asked), None
     setting = setting if asked is None else setting.telling([asked])
     motion, wanted = setting.motion, None
     goal = at if isinstance(at, ClosedConfiguration) else setting.everything.start

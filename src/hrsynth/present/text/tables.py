@@ -9,13 +9,11 @@ import textwrap
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ...tolerances import LARGEST_FIRST_ORDER
 
 if TYPE_CHECKING:
     from ...analysis.observed import ObservedRobot
-    from ...kinematics.joint_coordinates import JointCoordinates
+    from ...kinematics.joint_coordinates import FileCoordinates
     from ...mechanism import Mechanism, Observation
 
 Rows = list[tuple[str, str | Sequence[str]]]
@@ -97,7 +95,7 @@ def known_row(name: str, value: str | None) -> Rows:
     return [] if value is None else [(name, value)]
 
 
-def joint_rows(found: JointCoordinates | None, beyond: Sequence[str] = ()) -> Rows:
+def joint_rows(found: FileCoordinates | None, beyond: Sequence[str] = ()) -> Rows:
     """The coordinates of the motors and of the other joints at a configuration, and those beyond their limits."""
     rows = [] if found is None else [("motors", found.motors), ("joints", found.joints)]
     told = [(name, ", ".join(f"{joint} {write_value(x)}" for joint, x in each.items())) for name, each in rows if each]
@@ -106,7 +104,7 @@ def joint_rows(found: JointCoordinates | None, beyond: Sequence[str] = ()) -> Ro
 
 def write_value(value: float | tuple[float, ...]) -> str:
     """A joint's coordinate, or its coordinates."""
-    return "/".join(f"{round(x, 9) + 0.0:.6g}" for x in np.atleast_1d(value))
+    return "/".join(f"{round(x, 9) + 0.0:.6g}" for x in (value if isinstance(value, tuple) else (value,)))
 
 
 def dropped_limits(setting: ObservedRobot) -> Rows:

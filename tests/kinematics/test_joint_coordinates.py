@@ -1,0 +1,178 @@
+"""Poses by joints: coordinates that a closed configuration has lead to it again, or to where the straight line of the
+coordinates leads; what cannot be is refused, and says which joint stops it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import hrsynth
+from hrsynth.analysis.asked import asked_at
+from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.cli import execute
+from hrsynth.errors import BadRequest, PoseNotReached
+from hrsynth.geometry.vectors import Array
+from hrsynth.kinematics.configuration import ClosedConfiguration
+from hrsynth.kinematics.joint_coordinates import FileCoordinates, counted_joints, read_joints
+from hrsynth.kinematics.walking import random_walk
+from hrsynth.mechanism import Limits, Mechanism
+from hrsynth.mechanism.pose import JointPose, asked_pose
+from kinematics.robots import ROBOTS
+
+PIECES = 300
+
+
+def along_line(start: ClosedConfiguration, names: list[str], wanted: dict[str, tuple[float, ...]]) -> Array:
+    """Where plain Newton steps of least norm lead, on a straight line of the coordinates in many pieces."""
+    twin = start.twin
+    places = [i for name in names for i in twin.coordinates[name]]
+    units = [twin.length if twin.mechanism.joints[name].type.slides else 1.0 for name in names]
+    goal = np.concatenate([np.array(wanted[name]) / unit for name, unit in zip(names, units, strict=True)])
+    begun, q = twin.difference(twin.q0, start.q)[places], start.q
+    for k in range(1, PIECES + 1):
+        aim = begun + (goal - begun) * k / PIECES
+        for _ in range(8):
+            error = np.concatenate([twin.residual(q), twin.difference(twin.q0, q)[places] - aim])
+            if np.linalg.norm(error) < 1e-11:
+                break
+            J = np.vstack([twin.jacobian(q), np.eye(twin.nv)[places]])
+            q = twin.integrate(q, np.asarray(-np.linalg.lstsq(J, error, rcond=1e-9)[0]))
+    return np.asarray(q)
+
+
+def determine(start: ClosedConfiguration, names: list[str], link: str) -> bool:
+    """Whether these joints at rest hold the platform at rest."""
+    T = start.kernel()[0]
+    rows = np.eye(start.twin.nv)[[i for name in names for i in start.twin.coordinates[name]]] @ T
+    both = np.vstack([rows, start.velocity(link) @ T])
+    return bool(np.linalg.matrix_rank(rows, 1e-6) == np.linalg.matrix_rank(both, 1e-6))
+
+
+@pytest.mark.some(4, 12)
+@pytest.mark.parametrize("motors", [True, False])
+@pytest.mark.parametrize("name", ROBOTS)
+def test_a_configuration_is_found_again_by_its_joints(name: str, motors: bool) -> None:
+    """Where the line leads elsewhere, an independent way along it leads there too."""
+    setting = ObservedRobot.of(name)
+    start, link = setting.everything.start, setting.motion.link
+    names = [joint.name for joint in counted_joints(setting.robot) if joint.actuated == motors]
+    if not names or not all(name in start.twin.coordinates for name in names) or not determine(start, names, link):
+        pytest.skip("these joints do not say where the platform is")
+    for at in random_walk(start, 8, seed=3):
+        wanted = {name: read_joints(at)[name] for name in names}
+        (found,) = asked_at(setting, [JointPose(motors, tuple(wanted.items()))])
+        if isinstance(found, PoseNotReached):
+            assert found.reason.startswith(("a singularity lies ahead", "with the others as they are"))
+            continue
+        told = read_joints(found)
+        assert max(np.abs(np.subtract(told[name], wanted[name])).max() for name in names) < 1e-6
+        if np.abs(found.pose(link) - at.pose(link)).max() > 1e-5:
+            q = along_line(start, names, wanted)
+            assert np.abs(found.pose(link) - start.twin.pose(q, link)).max() < 1e-5
+
+
+def test_coordinates_count_as_the_file_counts() -> None:
+    """After the zero configuration has moved the same pose has the same coordinates."""
+    moved = hrsynth.observe("delta", at="motors:0.1,0.2,0.3")
+    told = FileCoordinates.of(moved.everything.start)
+    assert told.motors == pytest.approx({"shoulder_1": 0.1, "shoulder_2": 0.2, "shoulder_3": 0.3}, abs=1e-9)
+    (back,) = asked_at(moved, [asked_pose("motors:0,0,0")])
+    assert isinstance(back, ClosedConfiguration)
+    zero = ObservedRobot.of("delta").everything.start
+    link = moved.motion.link
+    assert np.abs(back.pose(link) - zero.pose(link)).max() < 1e-8
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        "motors:0.1,0.05,-0.1",
+        "motors:shoulder_1=0.1,shoulder_3=-0.1,shoulder_2=0.05",
+        {"motors": [0.1, 0.05, -0.1]},
+        {"motors": np.array([0.1, 0.05, -0.1])},
+        {"joints": {"shoulder_1": 0.1, "shoulder_2": 0.05, "shoulder_3": -0.1}},
+        {"motors": {"shoulder_1": f"{np.degrees(0.1):.15g}deg"} | {"shoulder_2": 0.05, "shoulder_3": -0.1}},
+    ],
+)
+def test_all_ways_of_giving_them_are_one(given) -> None:
+    pose = hrsynth.check("3rrr_m1", at=given).postures[0].pose
+    assert str(pose) == str(hrsynth.check("3rrr_m1", at="motors:0.1,0.05,-0.1").postures[0].pose)
+
+
+def test_motors_that_are_not_named_stay() -> None:
+    found = hrsynth.check("delta", at="motors:shoulder_2=0.2").postures[0].coordinates
+    assert found.motors == pytest.approx({"shoulder_1": 0.0, "shoulder_2": 0.2, "shoulder_3": 0.0}, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("motors:0.1", "number of motors"),
+        ("motors:elbow_1=0.1", "unknown among its motors"),
+        ("joints:nothing=0.1", "unknown among its joints"),
+        ("joints:elbow_1=0.1/0.2", "coordinates of elbow_1"),
+        ("joints:elbow_1=0.1,elbow_1=0.2", "each name once"),
+        ("motors:0.1,shoulder_2=0.1", "motors of a pose"),
+        ("motors:nan,0,0", "finite"),
+        ("motors:", "motors of a pose"),
+        ({"motors": "0.1,x,0.1"}, "motors of a pose"),
+        ({"joints": 3}, "joints of a pose"),
+        ({"joints": [[0.1, "a"]]}, "joints of a pose"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(given, said: str) -> None:
+    with pytest.raises(BadRequest) as refused:
+        hrsynth.check("3rrr_m1", at=given)
+    assert said in str(refused.value)
+
+
+def limited(name: str, joint: str, upper: float) -> Mechanism:
+    robot = hrsynth.load(name)
+    return robot.changed(joints=[replace(robot.joints[joint], limits=Limits(-upper, upper))])
+
+
+def test_a_value_beyond_its_limits_is_refused() -> None:
+    with pytest.raises(BadRequest, match="shoulder_1 beyond its limits"):
+        hrsynth.check(limited("3rrr_m1", "shoulder_1", 0.05), at="motors:0.1,0,0")
+
+
+def test_a_joint_at_its_limit_stops_the_way_and_is_named() -> None:
+    free = hrsynth.check("3rrr_m1", at="motors:0.2,0.2,0.2").postures[0].coordinates
+    assert free is not None
+    joint, value = max(free.joints.items(), key=lambda each: abs(float(each[1])))
+    with pytest.raises(PoseNotReached, match=f"{joint} is at its limit") as refused:
+        hrsynth.check(limited("3rrr_m1", joint, abs(float(value)) / 2), at="motors:0.2,0.2,0.2")
+    assert 0.2 < refused.value.came < 0.8
+
+
+def test_motors_that_no_assembly_allows_stop_at_a_singularity() -> None:
+    with pytest.raises(PoseNotReached, match=r"a singularity lies ahead, at which shoulder_\d stops"):
+        hrsynth.check("delta", at="motors:5,0.2,0.3")
+
+
+def test_coordinates_that_contradict_each_other_are_refused() -> None:
+    with pytest.raises(PoseNotReached, match="with the others as they are"):
+        hrsynth.check("3rrr_m1", at="joints:shoulder_1=0.1,shoulder_2=0,shoulder_3=0,elbow_1=0.4")
+
+
+@pytest.mark.parametrize("command", ["check", "modes", "accuracy", pytest.param("endings", marks=pytest.mark.slow)])
+def test_each_command_takes_them_and_tells_them(command: str, capsys) -> None:
+    more = ["--cone", "0.1deg"] * (command == "accuracy")
+    assert execute([command, "3rrr_m1", "--at", "motors:0.05,0,0", "--json", *more]) == 0
+    told = capsys.readouterr().out
+    first = next(each for each in json.loads(told).values() if isinstance(each, list) and "coordinates" in str(each))[0]
+    assert first["coordinates"]["motors"] == pytest.approx(
+        {"shoulder_1": 0.05, "shoulder_2": 0.0, "shoulder_3": 0.0}, abs=1e-8
+    )
+
+
+def test_joints_that_the_normal_form_has_joined_are_told() -> None:
+    """The passive hinges of a U, and of a ball written as three R, have the coordinates that their file has."""
+    setting = ObservedRobot.of("3upu")
+    (at,) = asked_at(setting, [asked_pose("motors:0.02,-0.01,0.03")])
+    assert isinstance(at, ClosedConfiguration)
+    robot = setting.robot
+    assert {*read_joints(at)} == {joint.name for joint in counted_joints(robot)}
