@@ -116,6 +116,8 @@ def _wanted(robot: Mechanism, asked: JointPose) -> dict[str, tuple[float, ...]]:
     """The coordinates by name: those that are asked for, and those of motors that stay."""
     joints = {joint.name: joint for joint in counted_joints(robot, asked.motors)}
     sizes = {name: joint.type.freedoms for name, joint in joints.items()}
+    if not joints:
+        raise BadRequest(f"{robot.name}: a pose by {asked.kind}", str(asked), f"another pose: it has no such {asked.kind}")
     given = dict(asked.values)
     if "" in given:
         flat = [x for _, part in asked.values for x in part]
