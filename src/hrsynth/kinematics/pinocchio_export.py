@@ -17,7 +17,7 @@ from ..description.chains import part_names
 from ..description.contents import content_of
 from ..description.tree import spanning
 from ..geometry.so3 import turns_about
-from ..geometry.vectors import Array, transform
+from ..geometry.vectors import Array, inverse, transform
 from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.model import Link
 from ..mechanism.screws import elementary
@@ -138,13 +138,14 @@ class _Export:
         models: list[tuple[pin.JointModel, Array, pin.SE3]] = []
         if joint.type in _WHOLE:
             D = pin.SE3.Identity() if joint.offset is None else pin.SE3(joint.offset)
-            start = D * X
-            q = pin.SE3ToXYZQUAT(start.actInv(X))
-            models = [(_WHOLE[joint.type](), q[3:] if joint.type is JointType.SPHERICAL else q, X)]
+            start = pin.SE3(D.rotation @ X.rotation, joint.point)
+            q = pin.SE3ToXYZQUAT(start.actInv(D.actInv(start)))
+            models = [(_WHOLE[joint.type](), q[3:] if joint.type is JointType.SPHERICAL else q, D.actInv(start))]
         else:
-            start = X
-            parts = elementary(joint.type, joint.axes)
-            for (kind, axis), value in reversed(list(zip(parts, _values(joint), strict=True))):
+            parts = list(zip(elementary(joint.type, joint.axes), _values(joint), strict=True))
+            slid = sum(value * axis for (kind, axis), value in parts if kind is JointType.PRISMATIC)
+            start = pin.SE3(X.rotation, joint.point + slid)
+            for (kind, axis), value in reversed(parts):
                 own = start.rotation.T @ axis
                 slides = kind is JointType.PRISMATIC
                 model = (pin.JointModelPrismaticUnaligned if slides else pin.JointModelRevoluteUnaligned)(own)
@@ -204,6 +205,6 @@ def _values(joint: Joint) -> Array:
         return np.zeros(joint.type.freedoms)
     if joint.type is not JointType.PLANAR:
         return joint.offset
-    shift = joint.point - transform(joint.offset, joint.point)
+    shift = transform(inverse(joint.offset), joint.point) - joint.point
     slides = [axis @ shift for _, axis in elementary(joint.type, joint.axes)[:2]]
     return np.array([*slides, *turns_about(joint.axis[None], joint.offset[:3, :3].T)])
