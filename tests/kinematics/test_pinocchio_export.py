@@ -1,5 +1,5 @@
-"""What Pinocchio is given closes, moves and weighs as the robot does: against the twin, against Pinocchio's own reader of
-the file's tree, and against MuJoCo, which reads what this project writes for it."""
+"""What Pinocchio is given closes, moves and weighs as the robot does: against the twin, against Pinocchio's own reader
+of the file's tree, and against MuJoCo, which reads what this project writes for it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 
 import hrsynth
 from description.foreign.test_models import FIGURES, model
-from hrsynth.description.contents import content_of
+from hrsynth.description.contents import Inertial, content_of, fragments
 from hrsynth.description.tree import spanning
 from hrsynth.geometry.so3 import logarithm
 from hrsynth.geometry.vectors import Array, pose
@@ -26,6 +26,7 @@ from hrsynth.mechanism import Coupling, JointType, Limits, Mechanism
 from hrsynth.mechanism.builder import Builder
 from kinematics.robots import ROBOTS, walked
 from kinematics.test_twin import CYCLES, cycle
+from strategies import random_rotation
 
 AGREE = 1e-9
 TORQUES = 1e-6
@@ -204,24 +205,20 @@ def test_gears_are_rows():
 
 
 def weighed(robot: Mechanism, seed: int = 0) -> Mechanism:
-    """The robot with random masses and inertias on all links that have none."""
-    rng = np.random.default_rng(seed)
-
-    def text() -> str:
-        A = rng.normal(size=(3, 3))
-        J = A @ A.T + np.trace(A @ A.T) * np.eye(3)
-        names = {"ixx": J[0, 0], "iyy": J[1, 1], "izz": J[2, 2], "ixy": J[0, 1], "ixz": J[0, 2], "iyz": J[1, 2]}
-        tensor = " ".join(f'{key}="{0.01 * value:.6f}"' for key, value in names.items())
-        xyz, rpy = (" ".join(f"{value:.4f}" for value in rng.uniform(-0.3, 0.3, 3)) for _ in range(2))
-        mass = f'<mass value="{rng.uniform(0.1, 2):.4f}"/><inertia {tensor}/>'
-        return f'<inertial><origin xyz="{xyz}" rpy="{rpy}"/>{mass}</inertial>'
-
-    return robot.changed(
-        links=[
-            link if content_of(link, robot).inertial else replace(link, xml=(*link.xml, text()))
-            for link in robot.links.values()
-        ]
-    )
+    """The robot with random masses of links that have none, and random inertias where no body can have the file's,
+    which are not written for MuJoCo."""
+    rng, links = np.random.default_rng(seed), []
+    for link in robot.links.values():
+        content = content_of(link, robot)
+        place = pose(rng.uniform(-0.3, 0.3, 3), random_rotation(rng))
+        own, A = content.inertial, rng.normal(size=(3, 3))
+        if own is None or own.mass == 0:
+            own = Inertial(rng.uniform(0.1, 2), place)
+        moments = np.linalg.eigvalsh(np.zeros((3, 3)) if own.inertia is None else own.inertia)
+        if not moments[0] > 0 or 2 * moments[2] > moments.sum():
+            own = replace(own, inertia=0.01 * (A @ A.T + np.trace(A @ A.T) * np.eye(3)))
+        links.append(replace(link, xml=fragments(replace(content, inertial=own))))
+    return robot.changed(links=links)
 
 
 class Simulated:

@@ -38,15 +38,15 @@ class PinocchioExport(NamedTuple):
     q0: Array
     """The zero configuration of the mechanism, at which all loops are closed, as the file counts (nq,)."""
     joints: dict[str, tuple[str, ...]]
-    """The joints of the file, each with the names of the model's joints that it is: S and floating joints are one, fixed
-    joints and balls that close a loop none, others one an axis."""
+    """The joints of the file, each with the names of the model's joints that it is: S and floating joints are one,
+    fixed joints and balls that close a loop none, others one an axis."""
     motors: tuple[str, ...]
     """Names of the model's joints that motors drive."""
     closures: tuple[str, ...]
     """Names of the file's joints that the constraint models are."""
     couplings: Array
-    """Gears, which no constraint model says: ``couplings @ v = 0`` and ``couplings @ pin.difference(model, q0, q) = 0``,
-    shape (gears, nv)."""
+    """Gears, which no constraint model says, (gears, nv): ``couplings @ v = 0``, and
+    ``couplings @ pin.difference(model, q0, q) = 0``."""
 
 
 @with_spelling
