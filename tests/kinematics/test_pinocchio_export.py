@@ -204,6 +204,25 @@ def test_gears_are_rows():
     np.testing.assert_array_equal(robot.to_pinocchio().couplings, [[-0.3, 1.0]])
 
 
+@pytest.mark.some(2)
+@pytest.mark.parametrize("name", ROBOTS)
+def test_forward_dynamics_are_those_of_the_free_motions(name: str):
+    """With the small armature that bodies without a mass need."""
+    pinned = Pinned(weighed(hrsynth.load(name)).to_pinocchio())
+    model, data, q, still = pinned.model, pinned.data, pinned.export.q0, np.zeros(pinned.model.nv)
+    model.gravity.linear, model.armature = GRAVITY, np.full(model.nv, 1e-9)
+    Z = kernel(pinned.constraints(q)[1])
+    M = np.triu(pin.crba(model, data, q, pin.Convention.WORLD))
+    M = Z.T @ (M + np.triu(M, 1).T) @ Z
+    free = Z @ np.linalg.solve(M, -Z.T @ pin.computeGeneralizedGravity(model, data, q))
+    loops = pin.StdVec_RigidConstraintModel()
+    loops.extend(pinned.export.constraint_models)
+    pin.initConstraintDynamics(model, data, loops, pinned.own)
+    settings = pin.ProximalSettings(1e-12, 1e-10, 50)
+    found = pin.constraintDynamics(model, data, q, still, still, loops, pinned.own, settings)
+    np.testing.assert_allclose(found, free, atol=1e-4 * np.abs(free).max())
+
+
 def weighed(robot: Mechanism, seed: int = 0) -> Mechanism:
     """The robot with random masses of links that have none, and random inertias where no body can have the file's,
     which are not written for MuJoCo."""
