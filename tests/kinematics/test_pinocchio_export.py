@@ -12,9 +12,8 @@ import pinocchio as pin
 import pytest
 
 import hrsynth
-from description.foreign.test_models import FIGURES, model
+from description.foreign.test_models import FIGURES, MODELS, model
 from hrsynth.description.contents import Inertial, content_of, fragments
-from hrsynth.description.tree import spanning
 from hrsynth.geometry.so3 import logarithm
 from hrsynth.geometry.vectors import Array, pose
 from hrsynth.kinematics.configuration import ClosedConfiguration
@@ -32,6 +31,10 @@ AGREE = 1e-9
 TORQUES = 1e-6
 ROWS = 1e-8
 """Part of the largest singular value below which rows depend on others."""
+
+
+GRAVITY = np.array([2.0, -3.0, -9.0])
+"""So turned that robots in a horizontal plane carry something too (m/s²)."""
 
 
 def robot_named(name: str) -> Mechanism:
@@ -124,11 +127,12 @@ def test_loops_of_every_type(letter: str):
 
 
 @pytest.mark.some(3)
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", [*ROBOTS, *(name for name in FIGURES if name.endswith(".urdf"))])
 def test_coordinates_are_those_of_the_file(name: str):
     """Joints by joints of the tree that Pinocchio reads: placements, names, sense; balls at rest, which a file says as
     three joints."""
-    export, theirs = hrsynth.to_pinocchio(name), pin.buildModelFromUrdf(str(hrsynth.shipped()[name]))
+    robot = robot_named(name)
+    export, theirs = robot.to_pinocchio(), pin.buildModelFromUrdf(str(hrsynth.shipped().get(name, MODELS / name)))
     rng, q, their_q = np.random.default_rng(0), export.q0.copy(), pin.neutral(theirs)
     for joint in export.model.joints[1:]:
         if joint.nq == 1 and theirs.existJointName(export.model.names[joint.id]):
@@ -139,7 +143,7 @@ def test_coordinates_are_those_of_the_file(name: str):
     data, their_data = export.model.createData(), theirs.createData()
     pin.framesForwardKinematics(export.model, data, q)
     pin.framesForwardKinematics(theirs, their_data, their_q)
-    for link in hrsynth.load(name).links:
+    for link in robot.links:
         mine, other = (
             d.oMf[m.getFrameId(link, pin.FrameType.BODY)] for m, d in ((export.model, data), (theirs, their_data))
         )
@@ -173,24 +177,26 @@ def test_coordinates_count_from_the_zero_of_the_file(name: str):
         np.testing.assert_allclose(there.data.oMf[there.links[link]].homogeneous, at.pose(link), atol=AGREE)
 
 
-def test_a_joint_that_is_passed_backwards_keeps_its_sense():
-    robot = hrsynth.load("3rrr_m1")
-    joints = list(robot.joints.values())
-    given = robot.changed(joints=[replace(each.turned(), in_tree=False) for each in joints])
-    mine, theirs = robot.to_pinocchio(), given.to_pinocchio()
+@pytest.mark.parametrize("name", ["3rrr_m1", "3puu", "delta"])
+def test_joints_that_are_passed_backwards_keep_their_sense(name: str):
+    """Each R, P and U given the other way round, which exchanges the axes of a U."""
+    robot = hrsynth.load(name)
+    turned = [each.turned() for each in robot.joints.values() if each.type is not JointType.SPHERICAL]
+    mine, other = Pinned(robot.to_pinocchio()), Pinned(robot.changed(joints=turned).to_pinocchio())
     rng = np.random.default_rng(1)
-    for joint in spanning(given).joints.values():
-        if joint.in_tree and robot.joints[joint.name].in_tree:
+    q, their_q = mine.export.q0.copy(), other.export.q0.copy()
+    for joint in turned:
+        parts, theirs = mine.export.joints[joint.name], other.export.joints[joint.name]
+        for part, same in zip(parts, theirs[::-1], strict=True) if joint.in_tree else ():
             value = rng.uniform(-1, 1)
-            for export in (mine, theirs):
-                export.q0[export.model.joints[export.model.getJointId(joint.name)].idx_q] = value
-    ours, other = Pinned(mine), Pinned(theirs)
-    ours.constraints(mine.q0)
-    other.constraints(theirs.q0)
-    for link in {joint.successor for joint in joints[:2]}:
-        np.testing.assert_allclose(
-            ours.data.oMf[ours.links[link]].homogeneous, other.data.oMf[other.links[link]].homogeneous, atol=AGREE
-        )
+            q[mine.model.joints[mine.model.getJointId(part)].idx_q] = value
+            their_q[other.model.joints[other.model.getJointId(same)].idx_q] = value
+            assert (part == same) == (len(parts) == 1)
+    mine.constraints(q)
+    other.constraints(their_q)
+    for link in robot.links:
+        X, Y = (each.data.oMf[each.links[link]].homogeneous for each in (mine, other))
+        np.testing.assert_allclose(X, Y, atol=AGREE)
 
 
 def test_gears_are_rows():
@@ -282,10 +288,6 @@ class Simulated:
             if np.abs(step).max(initial=0.0) < 1e-12:
                 break
         self.constraints()
-
-
-GRAVITY = np.array([2.0, -3.0, -9.0])
-"""So turned that robots in a horizontal plane carry something too (m/s²)."""
 
 
 def differences(robot: Mechanism, folder: Path) -> tuple[float, float, bool]:

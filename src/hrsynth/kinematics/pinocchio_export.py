@@ -1,7 +1,7 @@
 """A mechanism for Pinocchio alone: the file's tree in metres, its loops as Pinocchio's own constraints.
 
-The frame of a joint lies at its centre, turned as the link that it carries, so that q is what the tree in the file has.
-Of :mod:`.pinocchio_model` it differs in what it is for: that one chooses its tree, its zero and its unit of length.
+The frame of a joint lies at its centre, turned as the link that it carries. :mod:`.pinocchio_model`, with which this
+project computes, has a tree, a zero and a unit of length of its own.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ class _Export:
             self._model,
             constraints,
             np.array(self._q0),
-            {name: self._joints.get(name, ()) for name in self._robot.joints},
+            {name: self._joints.get(name, ())[:: self._order(joint)] for name, joint in self._robot.joints.items()},
             tuple(part for name in driven for part in self._joints[name]),
             tuple(each.name for each in constraints),
             self._gears(),
@@ -116,6 +116,11 @@ class _Export:
     def _carried(self, link: str) -> list[Joint]:
         """The joints to be added on a link, the last one first: those of the tree and those that end in a leaf."""
         return [each for each in self._robot.joints_of(link)[::-1] if each.predecessor == link and not _is_ball(each)]
+
+    def _order(self, joint: Joint) -> int:
+        """-1 where a U is passed against its direction, from its second axis to its first."""
+        given = self._given.joints.get(joint.name, joint)
+        return -1 if joint.type is JointType.UNIVERSAL and given.predecessor != joint.predecessor else 1
 
     def _frame(self, joint: Joint) -> pin.SE3:
         """The frame of a joint at the zero configuration."""
@@ -152,9 +157,8 @@ class _Export:
                 models.insert(0, (model, np.array([value]), start))
                 start *= pin.SE3(np.eye(3), -value * own) if slides else pin.SE3(pin.exp3(-value * own), np.zeros(3))
         names = [name for name, _ in joint.turns] or part_names(joint.name, len(models)) if models else []
-        given = self._given.joints.get(joint.name, joint)
-        if given.predecessor != joint.predecessor and not joint.turns:
-            names.reverse()
+        if not joint.turns:
+            names = names[:: self._order(joint)]
         for name, (model, q, after) in zip(names, models, strict=True):
             body = self._model.addJoint(body, model, self._at[body].actInv(start), name)
             frame = self._model.addJointFrame(body, frame)
@@ -170,20 +174,25 @@ class _Export:
         return own.idx_q, own.idx_v
 
     def _bound(self) -> None:
-        """The limits that the file has."""
+        """The limits that the file has; those of a U, C or E, one for all its axes, count from the file's zero."""
         model = self._model
-        for stop in self._robot.stops.values():
-            if stop.place < len(self._joints.get(stop.joint, ())):
-                i, _ = self._start(stop.joint, stop.place)
-                model.lowerPositionLimit[i], model.upperPositionLimit[i] = np.add(stop[2:], self._q0[i])
         for name, joint in self._robot.joints.items():
-            for place in range(len(self._joints.get(name, ()))):
-                _, i = self._start(name, place)
+            for place in range(0 if joint.type in _WHOLE else len(self._joints.get(name, ()))):
                 limits = joint.turns[place][1] if joint.turns else joint.limits
-                if limits is not None and limits.velocity is not None:
-                    model.upperVelocityLimit[i], model.lowerVelocityLimit[i] = limits.velocity, -limits.velocity
-                if limits is not None and limits.effort is not None:
-                    model.upperEffortLimit[i], model.lowerEffortLimit[i] = limits.effort, -limits.effort
+                if limits is None:
+                    continue
+                i, k = self._start(name, place)
+                zero = self._q0[i] if joint.turns or joint.type.freedoms == 1 else 0.0
+                for bounds, index, value, sign, start in (
+                    (model.lowerPositionLimit, i, limits.lower, 1, zero),
+                    (model.upperPositionLimit, i, limits.upper, 1, zero),
+                    (model.lowerVelocityLimit, k, limits.velocity, -1, 0.0),
+                    (model.upperVelocityLimit, k, limits.velocity, 1, 0.0),
+                    (model.lowerEffortLimit, k, limits.effort, -1, 0.0),
+                    (model.upperEffortLimit, k, limits.effort, 1, 0.0),
+                ):
+                    if value is not None:
+                        bounds[index] = start + sign * value
 
     def _gears(self) -> Array:
         """One row a coupling: the driven joint's rate − ratio × the driving one's."""
