@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import itertools
 import re
 import shlex
 from pathlib import Path
@@ -92,6 +93,16 @@ def test_the_python_example_runs_and_prints_what_it_says():
     with contextlib.redirect_stdout(io.StringIO()) as output:
         exec(compile(code, "README.md", "exec"), {})
     assert output.getvalue().splitlines() == said
+
+
+def test_the_program_of_a_page_runs_and_prints_what_it_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)
+    code = "\n".join(re.findall(r"```python\n(.*?)```", (PAGES / "pinocchio.md").read_text("utf-8"), re.DOTALL))
+    said = re.findall(r"# → (.*)", code)
+    with contextlib.redirect_stdout(io.StringIO()) as output:
+        exec(compile(code, "pinocchio.md", "exec"), {})
+    assert all(itertools.starmap(_alike, zip(said, output.getvalue().splitlines(), strict=True)))
 
 
 @pytest.mark.some(1)

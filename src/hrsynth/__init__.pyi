@@ -21,6 +21,7 @@ from .description import examples as examples
 from .description import load as load
 from .description import save as save
 from .description import shipped as shipped
+from .kinematics.pinocchio_export import to_pinocchio as to_pinocchio
 from .linting.lint import lint as lint
 from .present.show import draw as draw
 from .present.show import html as html
@@ -66,6 +67,7 @@ __all__ = [
     "singular",
     "studio",
     "text",
+    "to_pinocchio",
     "verify",
     "view",
 ]

@@ -25,6 +25,7 @@ HELPERS = {
     "analysis.study": ("map",),
     "certificates": ("certificate", "verify"),
     "description": ("examples", "load", "save", "shipped"),
+    "kinematics.pinocchio_export": ("to_pinocchio",),
     "linting.lint": ("lint",),
     "present.show": ("draw", "html", "text"),
     "present.studio.server": ("studio",),

@@ -286,6 +286,10 @@ class Mechanism(Result, shown_as="robot"):
         motors = sum(joint.actuated for joint in self.joints.values())
         return f"{self.name}, {len(self.links)} links, {len(self.joints)} joints, {motors} motors"
 
+    def to_pinocchio(self) -> Any:
+        """The robot as ``hrsynth.to_pinocchio`` gives it: model, constraint models, reference configuration, names."""
+        return Result.public("to_pinocchio")(self)
+
     def said(self) -> tuple[Any, ...]:
         """Everything except where it was read from: two mechanisms with the same links, joints and observations are
         equal."""
