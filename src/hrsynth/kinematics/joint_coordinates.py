@@ -24,7 +24,7 @@ from .configuration import ClosedConfiguration
 from .limits import Stops
 from .pinocchio_model import PinocchioModel
 from .platform_motion import PlatformMotion
-from .steps import STRIDE, track
+from .steps import STRIDE, nearest, track
 from .tasks import LinkPoses, solve
 
 COUNTED = (JointType.REVOLUTE, JointType.PRISMATIC, JointType.UNIVERSAL, JointType.CYLINDRICAL)
@@ -117,7 +117,7 @@ def _wanted(robot: Mechanism, asked: JointPose) -> dict[str, tuple[float, ...]]:
     joints = {joint.name: joint for joint in counted_joints(robot, asked.motors)}
     sizes = {name: joint.type.freedoms for name, joint in joints.items()}
     if not joints:
-        raise BadRequest(f"{robot.name}: a pose by {asked.kind}", str(asked), f"another pose: it has no such {asked.kind}")
+        raise BadRequest(f"{robot.name} has no such {asked.kind}", str(asked), "another pose")
     given = dict(asked.values)
     if "" in given:
         flat = [x for _, part in asked.values for x in part]
@@ -196,7 +196,7 @@ def _lead(home: ClosedConfiguration, motion: PlatformMotion, wanted: _Wanted, as
     worst = int(np.argmax(np.abs(missed)))
     if abs(missed[worst]) > AS_PRINTED:
         raise refuse(f"with the others as they are {wanted.names[worst]} is off by {abs(missed[worst]):.3g}")
-    return here
+    return nearest(here, aim, motion.at_home())
 
 
 Told = dict[str, float | tuple[float, ...]]

@@ -18,7 +18,7 @@ from ...kinematics.joint_coordinates import OfConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.steps import lead_to, track
 from ...mechanism.observation import Observation
-from ...mechanism.pose import AskedPose, ModeNumber, Pose, PoseLike, asked_pose
+from ...mechanism.pose import AskedPose, Pose, PoseLike, asked_pose
 from ...options import option
 from ...progress import tell
 from ...records import As, Recorded, Shown, recorded
@@ -509,7 +509,7 @@ def path(
     """
     wanted = [asked_pose(each) for each in (start, goal)]
     setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
-    return between_poses(setting, wanted, any_mode=not isinstance(wanted[1], ModeNumber), seed=seed, budget=budget)
+    return between_poses(setting, wanted, any_mode=isinstance(wanted[1], Pose), seed=seed, budget=budget)
 
 
 def between_poses(
