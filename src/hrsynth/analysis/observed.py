@@ -476,6 +476,7 @@ def _observed_robot(
 ) -> ObservedRobot:
     """The answer to the same words for the same value of a robot, of one ``source``, is the same value: it is drawn
     once."""
+    robot.require_platform()
     robot, asked, possible = _seeing(robot, cameras, see, offer)
     normal = normal_form(robot)
     anatomy = decompose(normal.mechanism)
