@@ -177,7 +177,7 @@ class LoopCheck(Result, shown_as="check"):
         rank.decided(f"{robot.name}: the constraints of its loops")
         told = LoopRank(names, twin.nv, sum(sizes), rank.value, rank.gap, rank.weakest, rank.dropped)
         redundant = list_redundant(usual_rows(found), generic=True)
-        more = (why, *filter(None, [robot.proposed_motors]))
+        more = (why, *([robot.proposed_motors] if robot.proposed_motors else []))
         return cls(robot, LoopMobility(kernel.shape[1]), told, redundant, more)
 
     @property

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import BadMechanism, NoPlatform
+from ..errors import BadMechanism, BadRequest, NoPlatform
 from ..geometry.vectors import Array, frozen, inverse, unit
 from ..results import Result, Value, content
 from ..tolerances import NO_SPREAD, SAME_GEOMETRY
@@ -362,11 +362,19 @@ class Mechanism(Result, shown_as="robot"):
 
     @property
     def proposed_motors(self) -> str | None:
-        """Which joints could be driven, where none is: those at the base; None where some are."""
-        if any(joint.actuated for joint in self.joints.values()):
-            return None
+        """That no joint is driven, and which could be: those at the base; None where there are none of either."""
         names = at_base(self.base, list(self.joints.values()))
+        if not names or any(joint.actuated for joint in self.joints.values()):
+            return None
         return f"no joint is driven: --motors {','.join(names)} could be (the joints at the base)"
+
+    def require_motors(self) -> None:
+        """Raise ``BadRequest`` where no joint is driven."""
+        if not any(joint.actuated for joint in self.joints.values()):
+            told = (self.proposed_motors or "").removeprefix("no joint is driven: ")
+            raise BadRequest(
+                f"{self.name} has no motor", None, f"one or more: --motors names them{told and f'; {told}'}"
+            )
 
     @cached_property
     def adjacency(self) -> Adjacency:

@@ -117,7 +117,10 @@ def _loop_check(found: LoopCheck) -> str:
     return listing(
         [
             ("robot", found.robot.name),
-            ("mobility", f"{found.mobility.total}: {told.coordinates} coordinates, {told.rank} independent constraints"),
+            (
+                "mobility",
+                f"{found.mobility.total}: {told.coordinates} coordinates, {told.rank} independent constraints",
+            ),
             ("constraints", values if told.rank else f"rank 0 of {told.rows}"),
             ("loops", wrap_lines(", ".join(told.loops), LINE - NAMES) if told.loops else "none, an open tree"),
             _redundant_row(found),
