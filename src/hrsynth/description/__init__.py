@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import difflib
 import os
+import re
 import tempfile
 from collections.abc import Iterable
 from dataclasses import replace
@@ -167,12 +168,18 @@ def _read_content(robot: Any, overrides: Overrides) -> Mechanism:
         file.write_bytes(data)
 
         def said(text: str) -> str:
-            return text.replace(str(file), GIVEN).replace(folder, NOWHERE)
+            whole = text.replace(str(file), GIVEN).replace(folder, NOWHERE)
+            return shorten_text(
+                re.sub(rf"\S{{{MOST_TOLD},}}", lambda word: shorten_text(word[0], MOST_TOLD), whole), 300
+            )
 
         try:
             found = read(file, overrides)
         except BadRobotFile as error:
-            raise BadRobotFile(replace(each, file=said(each.file)) for each in error.defects) from None
+            raise BadRobotFile(
+                replace(each, **{name: said(value) for name, value in vars(each).items() if isinstance(value, str)})
+                for each in error.defects
+            ) from None
         except HrsynthError as error:
             error.file, error.args = None, (said(str(error)),)
             raise

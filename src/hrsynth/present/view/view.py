@@ -157,9 +157,9 @@ def view(
     A 3D view of a robot, with ``hidden`` also of its hidden robot: every position of a slider is a closed
     configuration in which only one of the platform's coordinates differs from the zero configuration.
 
-    ``observe``, ``camera`` and ``see`` are as for ``derive``, which also says what is raised; without ``hidden`` neither
-    a platform nor a segment is needed: the first link that could be the platform is moved, and ``notes`` say so. Assembly modes that
-    cannot be listed and missing meshes are reported in ``notes``.
+    ``observe``, ``camera`` and ``see`` are as for ``derive``, which also says what is raised; without ``hidden``
+    neither a platform nor a segment is needed: the first link that could be the platform is moved, and ``notes`` say
+    so. Assembly modes that cannot be listed and missing meshes are reported in ``notes``.
 
     >>> hrsynth.view("3rrr_m1")
     <View: 3rrr_m1, 3 sliders, 1 other assembly modes>
