@@ -291,7 +291,7 @@ class Batch(Value):
     def _require_compilable(self, by: str) -> None:
         """Raise ``MissingExtra`` where a package is not there, ``BadRequest`` where this batch is not for it."""
         if find_spec(by) is None:
-            raise MissingExtra(f"compiled={by!r} (not False)", EXTRAS[by])
+            raise MissingExtra(f"compiled={by!r}", EXTRAS[by])
         if not self.closed:
             raise BadRequest(
                 "a batch whose platform has other twists at each pose, or legs that are solved by "

@@ -325,7 +325,7 @@ def test_a_xacro_file_without_the_package_says_so(tmp_path: Path, monkeypatch: p
         .replace("<robot", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"', 1)
         .replace("</robot>", '<xacro:property name="x" value="1"/></robot>')
     )
-    with pytest.raises(MissingExtra, match=r'robot.xml: a xacro file .*pip install "hrsynth\[xacro\]"'):
+    with pytest.raises(MissingExtra, match=r'robot.xml: a xacro file needs .*pip install "hrsynth\[xacro\]"'):
         load(made(tmp_path, text))
 
 

@@ -29,7 +29,7 @@ def expand(path: Path) -> xml.Element:
     import subprocess
 
     if importlib.util.find_spec("xacro") is None:
-        raise MissingExtra(f"{path}: a xacro file (not the URDF that it expands to)", "xacro")
+        raise MissingExtra(f"{path}: a xacro file", "xacro")
     process = Path(__file__).with_name("xacro_process.py")
     command = [sys.executable, "-P", str(process), str(path.resolve()), str(LARGEST_FILE), str(MOST_ELEMENTS)]
     try:
