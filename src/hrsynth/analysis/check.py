@@ -152,7 +152,7 @@ class LoopRank(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LoopCheck(Result, shown_as="check"):
+class LoopCheck(Result, shown_as="loop_check"):
     """What the loops alone say, where no platform or no segment can be looked at: mobility, the constraints' rank, and
     the redundant ones; and what it takes to say ``more``."""
 
@@ -161,7 +161,6 @@ class LoopCheck(Result, shown_as="check"):
     constraints: Recorded[LoopRank]
     redundant: Recorded[tuple[Redundancy, ...]]
     more: Recorded[tuple[str, ...]]
-    grid: None = None
 
     @classmethod
     def of(cls, robot: Mechanism, why: str) -> LoopCheck:

@@ -12,7 +12,6 @@ import numpy as np
 
 from ...analysis.aspects.words import SAME, SEPARATED
 from ...analysis.aspects.words import UNDECIDED as UNDECIDED_PAIR
-from ...analysis.check import LoopCheck
 from ...analysis.posture import CONSTRAINT, REGULAR, UNDECIDED
 from ...constraints.condition import General
 from ...mechanism.pose import Pose
@@ -38,7 +37,7 @@ from .tables import (
 if TYPE_CHECKING:
     from ...analysis.aspects.atlas import Atlas, ModePair
     from ...analysis.aspects.path import PathAnswer, SampledRoad
-    from ...analysis.check import Checked, GridCheck
+    from ...analysis.check import Check, Checked, GridCheck, LoopCheck
     from ...analysis.modes.assembly_mode import AssemblyMode
     from ...analysis.modes.modes import AssemblyModes
     from ...analysis.modes.near import NearMode
@@ -57,10 +56,8 @@ STATES = {
 _SINCE = {"hidden": "the observed directions", "real": "the motors' coordinates"}
 
 
-def check(found: Checked) -> str:
+def check(found: Check) -> str:
     """What is observed, a block for each pose, then redundant constraints and the grid in numbers."""
-    if isinstance(found, LoopCheck):
-        return _loop_check(found)
     seen = [f"{leg} ({', '.join(each)})" for leg, each in describe_watched(found.setting).items()]
     generic, written = found.setting.mobility, found.as_written
     rows = [
@@ -108,7 +105,7 @@ def _redundant_row(found: Checked) -> tuple[str, str | list[str]]:
     return "redundant", each_loop or "no constraint"
 
 
-def _loop_check(found: LoopCheck) -> str:
+def loop_check(found: LoopCheck) -> str:
     """What the loops alone say, and what it takes to say more."""
     told = found.constraints
     counted = f"{told.weakest:.2g} is the weakest singular value that counts, {told.dropped:.1g} the strongest that "
