@@ -177,7 +177,7 @@ def _read_content(robot: Any, overrides: Overrides) -> Mechanism:
             found = read(file, overrides)
         except BadRobotFile as error:
             raise BadRobotFile(
-                replace(each, **{name: said(value) for name, value in vars(each).items() if isinstance(value, str)})
+                replace(each, file=said(each.file), what=said(each.what), value=each.value and said(each.value))
                 for each in error.defects
             ) from None
         except HrsynthError as error:
