@@ -15,7 +15,10 @@ from hrsynth.analysis.check import Check, LoopCheck
 from hrsynth.cli import execute
 from hrsynth.cli.schema import schema
 from hrsynth.description import load, save, shipped
+from hrsynth.description.assembly.choices import choices
+from hrsynth.description.overrides import Overrides
 from hrsynth.errors import BadRequest, NoPlatform, NoSegment
+from hrsynth.index import analyses
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.model import PlatformChoice
 from oracle import Oracle
@@ -109,11 +112,42 @@ def test_what_no_segment_tells_is_answered_and_viewed(legs: int, tmp_path: Path)
         hrsynth.view(robot, hidden=True)
 
 
-@pytest.mark.parametrize("command", ["derive", "legs", "modes", "singular", "advise"])
-def test_what_needs_a_platform_asks_for_it(command: str):
+WAY = {"start": "x=0", "goal": "x=0.01"}
+GIVEN: dict[str, dict[str, object]] = {
+    "accuracy": {"cone": "0.1deg"},
+    "basins": {"to": "x=0", "grid": "x=0:0.1:2"},
+    "path": WAY,
+    "select": WAY,
+    "servo": WAY,
+}
+"""What questions cannot be asked without."""
+
+
+@pytest.mark.parametrize("command", sorted(analyses().keys() - {"check", "view"}))
+def test_every_other_question_asks_for_the_platform(command: str):
     for robot in (opened("3rrr_m1"), load(tree(2, 2))):
         with pytest.raises(NoPlatform, match="allowed: --platform LINK"):
-            getattr(hrsynth, command)(robot)
+            getattr(hrsynth, command)(robot, **GIVEN.get(command, {}))
+    assert isinstance(hrsynth.check(opened("3rrr_m1")), LoopCheck)
+
+
+@pytest.mark.parametrize("name", ["3rrr_m1", "delta", "quattro", "rrrrr_m1"])
+def test_motors_are_proposed_where_none_is_driven(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    """Of these robots the motors are those proposed; ``derive``, ``check`` and ``export`` tell them in one line."""
+    robot = load(name)
+    still = replace(robot, joints={name: replace(joint, motor=None) for name, joint in robot.joints.items()})
+    names = [joint.name for joint in robot.joints.values() if joint.actuated]
+    assert robot.proposed_motors is None
+    assert still.proposed_motors == f"no joint is driven: --motors {','.join(names)} could be (the joints at the base)"
+    save(still, tmp_path / "still.urdf")
+    told = f"--motors {','.join(names)} could be (the joints at the base)"
+    for command, status in (("derive", 0), ("check", 0), ("export", 2)):
+        capsys.readouterr()
+        output = ["-o", str(tmp_path / "code.hpp")] if command == "export" else []
+        assert execute([command, str(tmp_path / "still.urdf"), *output]) == status
+        assert [told in line for line in capsys.readouterr().err.splitlines()].count(True) == 1
+    found = choices(tmp_path / "still.urdf", Overrides())
+    assert found.proposed_motors == names
 
 
 @pytest.mark.parametrize("more", [{"at": "x=0"}, {"grid": "x=0:1:2"}, {"observe": "1"}, {"camera": "base"}])

@@ -69,6 +69,7 @@ def branch(robot: RobotLike, box: MotorBox = None, *, effort: Cells = BRANCH_CEL
         raise BadRequest("effort", effort, "1 cell or more")
     given = as_robot(robot)
     mechanism = given if isinstance(given, Mechanism) else given.robot
+    mechanism.require_platform()
     mechanism.require_motors()
     motors = [name for name, joint in mechanism.joints.items() if joint.actuated]
     asked = parsed_box(box)
