@@ -196,3 +196,17 @@ def test_lint_looks_at_all_of_a_file_without_a_platform(tmp_path: Path):
     found = {each.rule: each for each in hrsynth.lint(path).findings}
     assert "several could be" in found["unsaid"].message
     assert "motor-none" in found
+
+
+@pytest.mark.parametrize("text", [tree(2, 2), spherical(3)], ids=["tree", "spherical"])
+@pytest.mark.parametrize("command", ["check", "convert", "lint", "view"])
+def test_the_json_of_what_needs_no_platform_is_what_its_schema_says(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], command: str, text: str
+):
+    path = tmp_path / "robot.urdf"
+    path.write_text(text)
+    more = {"convert": [str(tmp_path / "robot.xml")], "view": ["--static", str(tmp_path / "view.html")]}
+    capsys.readouterr()
+    assert execute([command, str(path), *more.get(command, []), "--json"]) == 0
+    record = json.loads(capsys.readouterr().out)
+    assert list(Draft202012Validator(schema(command)).iter_errors(record)) == []
