@@ -112,7 +112,7 @@ def test_what_no_segment_tells_is_answered_and_viewed(legs: int, tmp_path: Path)
         hrsynth.view(robot, hidden=True)
 
 
-WAY = {"start": "x=0", "goal": "x=0.01"}
+WAY: dict[str, object] = {"start": "x=0", "goal": "x=0.01"}
 GIVEN: dict[str, dict[str, object]] = {
     "accuracy": {"cone": "0.1deg"},
     "basins": {"to": "x=0", "grid": "x=0:0.1:2"},
