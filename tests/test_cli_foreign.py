@@ -31,7 +31,8 @@ def test_check_tells_what_was_guessed_and_json_stays_clean(call, tmp_path: Path)
     status, out, remarks = call("check", path, "--json")
     assert status == 0
     assert json.loads(out)["configurations"][0]["mobility"] == {"total": 1, "idle": 0}
-    (guess,) = remarks
+    guess, motors = remarks
+    assert motors == "hrsynth: no joint is driven: --motors a,c could be (the joints at the base)"
     assert guess.startswith("hrsynth: guess: the platform is link 'bar', the farthest from the base (--platform LINK")
     status, out, remarks = call("check", path, "--platform", "bar", "--motors", "a", "--observe", "crank", "--json")
     assert (status, remarks) == (0, [])
@@ -56,6 +57,7 @@ def test_closures_parts_and_frozen_joints_from_the_command_line(call, tmp_path: 
     assert remarks == [
         "hrsynth: open: nothing in the file closes a loop: it is read as an open chain",
         "hrsynth: ignored: 1 links that are not between 'one' and 'three': base",
+        "hrsynth: no joint is driven: --motors q could be (the joints at the base)",
     ]
     status, out, _ = call("check", path, "--freeze", "p", "--json")
     assert json.loads(out)["configurations"][0]["dof"] == 2

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import re
 import subprocess
 import sys
 import tomllib
 from glob import glob
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -71,7 +73,7 @@ def test_every_extra_that_is_named_is_there_and_all_holds_them():
         for path in (ROOT / "src").rglob("*.py")
         for extra in re.findall(r'MissingExtra\([^()]*?"([a-z]+)"\)', path.read_text(encoding="utf-8"))
     }
-    assert {"plots", "solve", "bench", "usd"} <= named
+    assert {"plots", "solve", "bench", "usd", "xacro"} <= named
     assert named <= extras.keys()
     (whole,) = extras["all"]
     assert set(re.search(r"\[(.*)\]", whole)[1].split(",")) == extras.keys() - {"all"}
@@ -107,19 +109,59 @@ def without(packages: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=False)
 
 
-@pytest.mark.some(1)
-@pytest.mark.parametrize(
-    ("packages", "extra", "arguments"),
-    [
-        ("matplotlib", "plots", ["modes", "3rrr_m1", "-o", "modes.png"]),
-        ("matplotlib", "plots", ["derive", "3rrr_m1", "--report", "report.html"]),
-        (
-            "mujoco",
-            "bench",
-            ["servo", "3rrr_m1", "--start", "x=0,y=0,phi=0", "--goal", "x=0.01,y=0,phi=0", "--physics"],
-        ),
-    ],
-)
+XACRO = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:property name="x" value="1"/></robot>'
+SERVO = ["servo", "3rrr_m1", "--start", "x=0,y=0,phi=0", "--goal", "x=0.01,y=0,phi=0"]
+NEEDING = [
+    ("matplotlib", "plots", ["modes", "3rrr_m1", "-o", "modes.png"]),
+    ("matplotlib", "plots", ["derive", "3rrr_m1", "--report", "report.html"]),
+    ("mujoco", "bench", [*SERVO, "--physics"]),
+    ("mujoco", "bench", [*SERVO, "-o", "servo.gif"]),
+    ("xacro", "xacro", ["check", XACRO]),
+    ("xacro", "xacro", ["convert", XACRO, "robot.xml"]),
+    ("pxr", "usd", ["convert", "3rrr_m1", "robot.usdc"]),
+    ("distributed", "cluster", ["catalog", "build", "--check", "--cluster", "tcp://127.0.0.1:1", "planar"]),
+    *((package, "studio", ["view", "3rrr_m1"]) for package in ("h11", "starlette", "uvicorn", "websockets")),
+]
+
+
+def test_every_extra_of_a_command_or_function_is_tried():
+    """``view`` brings what ``studio`` does, and what ``docs`` brings no command needs."""
+    assert {extra for _, extra, _ in NEEDING} | {*CALLS} == PROJECT["optional-dependencies"].keys() - {
+        "all",
+        "docs",
+        "view",
+    }
+
+
+CALLS = {
+    "fast": lambda: compiled("numba"),
+    "jax": lambda: compiled("jax"),
+    "solve": lambda: import_module("hrsynth.analysis.modes.msolve").executable(),
+}
+"""What needs a package in Python alone, or where another way is left to the command."""
+
+
+def compiled(by: str) -> object:
+    """A pose evaluated by a package."""
+    batch = hrsynth.observe("delta").batch
+    return batch.evaluate(batch.home[None], compiled=by)
+
+
+@pytest.mark.parametrize("extra", CALLS)
+def test_a_function_tells_the_extra_that_it_needs(extra: str, monkeypatch: pytest.MonkeyPatch):
+    def missing(name: str) -> None:
+        raise importlib.metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr("hrsynth.batch.engine.find_spec", lambda name: None)
+    monkeypatch.setattr("importlib.metadata.files", missing)
+    monkeypatch.setenv("PATH", "")
+    with pytest.raises(MissingExtra, match=rf'pip install "hrsynth\[{extra}\]"') as caught:
+        CALLS[extra]()
+    assert caught.value.exit_status == 3
+
+
+@pytest.mark.some(4)
+@pytest.mark.parametrize(("packages", "extra", "arguments"), NEEDING)
 def test_what_needs_a_package_that_is_missing_says_so_in_one_line(packages, extra, arguments, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run = without(packages, *arguments)

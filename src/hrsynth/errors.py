@@ -40,6 +40,10 @@ def warn_caller(text: str, kind: type[Warning]) -> None:
     warnings.warn(text, kind, stacklevel=level)
 
 
+class GuessedBase(UserWarning):
+    """Warning that a file leaves open which link is the base, and which is taken for it."""
+
+
 class GuessedPlatform(UserWarning):
     """Warning that a file names no platform, and which link is taken for it."""
 
@@ -98,6 +102,10 @@ class BadRequest(HrsynthError):
         if self.allowed:
             text += f", allowed: {self.allowed}"
         super().__init__(text)
+
+
+class NoPlatform(BadRequest):
+    """A question about a platform, of a robot whose file names none and leaves several that could be."""
 
 
 class NoSegment(BadRequest):

@@ -132,10 +132,10 @@ class Head(TypedDict):
 
 
 class Platform(TypedDict):
-    """The link that is the platform (the first body of a formation); what chose it, and why."""
+    """The link that is the platform (the first body of a formation; null where it is open); what chose it, and why."""
 
-    link: str
-    chosen: Literal["file", "option", "guess"]
+    link: str | None
+    chosen: Literal["file", "option", "guess", "open"]
     reason: str
 
 

@@ -9,16 +9,20 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from ..batch.reach import grid_dependence, sweep
-from ..errors import PlaneNotMet, PoseNotReached, RankUndecided
+from ..errors import BadMechanism, NoPlatform, NoSegment, PlaneNotMet, PoseNotReached, RankUndecided
 from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.pinocchio_model import PinocchioModel
+from ..kinematics.sampled_mode import STEPS, firmest, require_motions
+from ..kinematics.walking import random_walk
+from ..mechanism import Mechanism
 from ..mechanism.pose import Grid, PoseLike, asked_poses
 from ..options import option
 from ..progress import tell
-from ..records import FLAT, As, Recorded, Shown, Table, recorded
+from ..records import FLAT, GAP, As, Recorded, Shown, Table, recorded
 from ..results import Result, Value
 from ..tolerances import RANK_GAP
 from .asked import asked_at, require_platform
-from .classes import Redundancy, list_redundant
+from .classes import Redundancy, list_redundant, usual_rows
 from .observed import (
     POINTS,
     POSES,
@@ -129,6 +133,71 @@ class Check(Result, shown_as="check"):
     unlimited = Shown(list[str], lambda self: self.setting.unlimited, UNLIMITED)
 
 
+class LoopMobility(NamedTuple):
+    """Freedoms of the file's own links and joints."""
+
+    total: int
+
+
+class LoopRank(NamedTuple):
+    """The rank of all constraints of the loops at a generic configuration, and what it rests on."""
+
+    loops: Annotated[tuple[str, ...], "the loops, and the couplings of joints"]
+    coordinates: Annotated[int, "coordinates of the joints, those at which loops are cut included"]
+    rows: Annotated[int, "constraints of the loops"]
+    rank: Annotated[int, "how many of them are independent"]
+    gap: Annotated[float, GAP]
+    weakest: Annotated[float, "the smallest singular value that counts, as part of the largest"]
+    dropped: Annotated[float, "the largest that does not count, as part of the largest: rounding at least"]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LoopCheck(Result, shown_as="loop_check"):
+    """What the loops alone say, where no platform or no segment can be looked at: mobility, the constraints' rank, and
+    the redundant ones; and what it takes to say ``more``."""
+
+    robot: Mechanism
+    mobility: Recorded[LoopMobility]
+    constraints: Recorded[LoopRank]
+    redundant: Recorded[tuple[Redundancy, ...]]
+    more: Recorded[tuple[str, ...]]
+
+    @classmethod
+    def of(cls, robot: Mechanism, why: str) -> LoopCheck:
+        """That of a mechanism, and ``why`` no more can be said; raises ``NotSampled``, ``RankUndecided``, ``Shaky``."""
+        twin = PinocchioModel(robot)
+        start = ClosedConfiguration.of(twin, twin.q0)
+        names, sizes = twin.blocks
+        moves = bool(names) and start.kernel()[0].shape[1] > 0
+        found = list(random_walk(start, 2 * STEPS, steps=STEPS)) if moves else [start]
+        if moves:
+            require_motions(found)
+        kernel, rank = firmest(found).kernel()
+        rank.decided(f"{robot.name}: the constraints of its loops")
+        told = LoopRank(names, twin.nv, sum(sizes), rank.value, rank.gap, rank.weakest, rank.dropped)
+        redundant = list_redundant(usual_rows(found), generic=True)
+        more = (why, *([robot.proposed_motors] if robot.proposed_motors else []))
+        return cls(robot, LoopMobility(kernel.shape[1]), told, redundant, more)
+
+    @property
+    @recorded(As("characteristic_length"))
+    def length(self) -> float:
+        """The characteristic length (m) that makes lengths comparable with angles."""
+        return self.robot.length
+
+    def said(self) -> tuple[Any, ...]:
+        """What is compared."""
+        return self.robot, self.to_dict()
+
+    def headline(self) -> str:
+        """The robot, its mobility, and its redundant constraints."""
+        rows = sum(each.rows for each in self.redundant)
+        return f"{self.robot.name}: mobility {self.mobility.total}, {rows} redundant constraints"
+
+
+Checked = Check | LoopCheck
+
+
 @analysis(
     30,
     examples=(
@@ -153,7 +222,7 @@ def check(
         option("A line, plane or box of poses, such as x=-0.3:0.3:21,y=-0.3:0.3:21,z=-0.7 (from:to:count).", "GRID"),
     ] = None,
     seed: Seed = 0,
-) -> Check:
+) -> Checked:
     """Mobility, ranks, singularities and redundant constraints at poses, and over a grid of poses.
 
     Mobility, ranks with gaps, Type 1, 2, 3, Zlatanov's six numbers, constraint singularities and redundant
@@ -165,6 +234,10 @@ def check(
     about the real robot take its motors' coordinates as what is measured.
     Generic values are those of random samples. ``observe`` and ``camera`` are as for ``derive``.
 
+    Where nothing more is asked, and the file leaves open which link is the platform or no leg has a segment, a
+    ``LoopCheck`` says what holds of any mechanism: mobility, the rank of the loop constraints with its gap, and which
+    of them are redundant; and what it takes to say ``more``.
+
     Of several poses, those out of reach are listed in ``unreached``. Raises ``BadRequest`` for unknown names and for
     parts of a pose that the platform cannot change, ``PoseNotReached`` if no pose is reached, ``PlaneNotMet`` if none
     of a grid is.
@@ -174,7 +247,12 @@ def check(
     """
     poses = asked_poses(at)
     cells = None if grid is None else Grid.parse(grid)
-    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed).telling(poses)
+    try:
+        setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed).telling(poses)
+    except (NoPlatform, NoSegment, BadMechanism) as error:
+        if not isinstance(robot, Mechanism) or poses or any(each is not None for each in (cells, observe, camera, see)):
+            raise
+        return LoopCheck.of(robot, str(error).removeprefix(f"{robot.file or robot.name}: "))
     examiner = ConfigurationAnalysis.of(setting)
     start, question, motion = setting.everything.start, setting.everything.question, setting.motion
     found = asked_at(setting, poses) or [start]

@@ -125,10 +125,12 @@ class ObservedRobot(Value):
         samples: int = SAMPLES,
         seed: int = 0,
         driven: bool = False,
+        blind: bool = False,
     ) -> ObservedRobot:
         """What a question is asked of: an observed robot itself, or a robot with what is watched of it, as
         :func:`.asked.observe`, and in the manner of ``see`` what is ``offer``-ed besides. A question about ``driven``
-        motors needs no segments: where there are none, the motors' coordinates are observed."""
+        motors needs no segments: where there are none, the motors' coordinates are observed; where it can be ``blind``,
+        and there are none of either, nothing."""
         robot = as_robot(robot)
         names = legs_asked(robot, observe, see)
         if isinstance(robot, ObservedRobot):
@@ -139,6 +141,7 @@ class ObservedRobot(Value):
                     "nothing besides an observed robot",
                 )
             return robot
+        robot.require_platform()
         tell("sampling")
         try:
             return _observed_robot(
@@ -150,7 +153,8 @@ class ObservedRobot(Value):
                 as_texts(offer),
                 samples,
                 seed,
-                driven,
+                driven or (blind and any(joint.actuated for joint in robot.joints.values())),
+                blind,
             )
         except (BadMechanism, NotSampled) as error:
             error.file = robot.file
@@ -476,6 +480,7 @@ def _observed_robot(
     samples: int,
     seed: int,
     driven: bool,
+    blind: bool,
 ) -> ObservedRobot:
     """The answer to the same words for the same value of a robot, of one ``source``, is the same value: it is drawn
     once."""
@@ -493,6 +498,8 @@ def _observed_robot(
         else (
             _encoders_of(anatomy)
             if driven and not defaults
+            else ()
+            if blind and not defaults
             else _observations(anatomy, normal, defaults, observe, given)
         )
     )
@@ -609,9 +616,8 @@ def motors(setting: ObservedRobot) -> Measurement:
 def _encoders_of(anatomy: LegDecomposition) -> tuple[Observation, ...]:
     mechanism = anatomy.mechanism
     of = {name: leg.label for leg in anatomy.legs for name in leg.joints}
+    mechanism.require_motors()
     driven = [joint for joint in mechanism.joints.values() if joint.actuated]
-    if not driven:
-        raise BadRequest(f"{mechanism.name} has no motor", None, "one or more: --motors names them")
     return tuple(each for joint in driven for each in encoders(mechanism, joint, of.get(joint.name, "")))
 
 

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..budgets import LARGEST_BATCH, POSES_FOR_COMPILING, POSES_FOR_NUMBA
 from ..closed_forms.legs import ClosedFormLeg
-from ..errors import BadRequest
+from ..errors import BadRequest, MissingExtra
 from ..geometry.components import Components, cross, plus, scale, tangents, transform_vector, where
 from ..geometry.vectors import Array, frozen
 from ..kinematics.configuration import ClosedConfiguration
@@ -289,9 +289,9 @@ class Batch(Value):
         )
 
     def _require_compilable(self, by: str) -> None:
-        """Raise ``BadRequest`` where a package is not there, or this batch is not for it."""
+        """Raise ``MissingExtra`` where a package is not there, ``BadRequest`` where this batch is not for it."""
         if find_spec(by) is None:
-            raise BadRequest(f"{by} is not installed", True, f"compiled=False, or the extra {EXTRAS[by]}")
+            raise MissingExtra(f"compiled={by!r}", EXTRAS[by])
         if not self.closed:
             raise BadRequest(
                 "a batch whose platform has other twists at each pose, or legs that are solved by "

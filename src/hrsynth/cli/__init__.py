@@ -9,7 +9,7 @@ import os
 import sys
 import warnings
 
-from ..errors import GuessedPlatform
+from ..errors import GuessedBase, GuessedPlatform
 from . import completion, files, importing, lint, schema, studio
 from .app import app as app
 from .catalog import catalog
@@ -55,7 +55,8 @@ def execute(arguments: list[str] | None = None) -> int:
     """Run a command; the exit status."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", GuessedPlatform)  # a note says it
+            for kind in (GuessedBase, GuessedPlatform):
+                warnings.simplefilter("ignore", kind)  # a note says it
             app.main(sys.argv[1:] if arguments is None else arguments)
         sys.stdout.flush()
         return 0

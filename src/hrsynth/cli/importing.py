@@ -105,6 +105,7 @@ def _read(source: dict[str, Any], observe: str | None, *, tell: bool) -> Mechani
     from ..description.overrides import names, observe_links
 
     mechanism = (robot_of if tell else quiet_robot_of)(dict(source))
+    mechanism.require_platform()
     return mechanism if observe is None else observe_links(mechanism, names(observe) or ())
 
 

@@ -94,6 +94,9 @@ class Question:
             for each, path in files.items():
                 if path is not None:
                     say(each.sentence(path))
+        motors = mechanism.proposed_motors if self.name in ("derive", "check") else None
+        if motors is not None and motors not in getattr(found, "more", ()):
+            warn(motors)
         for declared in options(self.name):
             if declared.deprecated and values.get(declared.name) is not None:
                 warn(f"{declared.names[0]} is deprecated, {declared.deprecated}")

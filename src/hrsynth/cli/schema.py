@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json as javascript
 from inspect import signature
-from typing import Any
+from typing import Any, get_args
 
 import hrsynth
 
@@ -31,19 +31,20 @@ def schema(command: str) -> dict[str, Any]:
     kind = commands()[command].record
     files: tuple[File, ...] = ()
     if kind is not None:
-        head = object_schema([kind], parts)
+        heads = [object_schema([kind], parts)]
     else:
         kind, files = answer_type(getattr(hrsynth, command)), outputs_of(command).files
         of_robot = "robot" in signature(getattr(hrsynth, command)).parameters
-        head = object_schema([OfRobot if of_robot else Head, kind], parts)
+        heads = [object_schema([OfRobot if of_robot else Head, each], parts) for each in get_args(kind) or (kind,)]
     fields = {file.field: str | None for file in files if file.option is not None and file.field is not None}
     fields |= {
         file.record: answer_type(function(file.computed)) | None for file in files if file.record and file.computed
     }
-    head["properties"] |= {name: records.schema(each, parts) for name, each in fields.items()}
-    head["required"] = sorted([*head["required"], *fields])
-    told = {"title": f"hrsynth {command} --json", "description": summary(kind)}
-    return {"$schema": DIALECT, **told, **head, "$defs": parts}
+    for each in heads:
+        each["properties"] |= {name: records.schema(kind, parts) for name, kind in fields.items()}
+        each["required"] = sorted([*each["required"], *fields])
+    told = {"title": f"hrsynth {command} --json", "description": summary((get_args(kind) or (kind,))[0])}
+    return {"$schema": DIALECT, **told, **(heads[0] if len(heads) == 1 else {"anyOf": heads}), "$defs": parts}
 
 
 def commands() -> dict[str, DeclaredCommand]:

@@ -5,14 +5,23 @@ from __future__ import annotations
 import contextlib
 import difflib
 import os
+import re
 import tempfile
 from collections.abc import Iterable
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, Any
 
-from ..errors import BadRequest, GuessedPlatform, warn_caller
+from ..errors import (
+    BadRequest,
+    BadRobotFile,
+    GuessedBase,
+    GuessedPlatform,
+    HrsynthError,
+    shorten_text,
+    warn_caller,
+)
 from ..mechanism.model import Mechanism, Note
 from ..results import with_spelling
 from . import formats
@@ -32,6 +41,12 @@ __all__ = ["examples", "load", "native", "save", "shipped", "spanning", "targets
 
 NAMED = "a path, the name of a shipped robot, example:NAME"
 """How a robot's file is given."""
+LOADED = f"{NAMED}, an open file, XML text, a yourdfpy.URDF"
+"""What is read."""
+MOST_TOLD = 60
+"""Letters of what was given that an error tells."""
+GIVEN, NOWHERE = "the given text", "(nowhere, as no file is given)"
+"""What errors call text, and the folder of the files that it names."""
 
 
 def shipped() -> dict[str, Path]:
@@ -47,7 +62,7 @@ def shipped() -> dict[str, Path]:
 
 @with_spelling
 def load(
-    robot: str | Path | Mechanism | URDF,
+    robot: str | Path | Mechanism | URDF | IO[str] | IO[bytes],
     *,
     base: str | None = None,
     platform: str | None = None,
@@ -61,10 +76,13 @@ def load(
     as_written: bool = False,
 ) -> Mechanism:
     """The mechanism of a robot file in any dialect, of a shipped robot given by its name, or of one from the package
-    example-robot-data (``example:cassie``), or of a ``yourdfpy.URDF``, read as the file that it writes (a tree, whose
-    closures are given); a mechanism is returned unchanged.
+    example-robot-data (``example:cassie``); of an open file or of XML text (what holds ``<``), whose root element tells
+    the dialect, while files that text names relatively lie nowhere; of a ``yourdfpy.URDF``, read as the file that it
+    writes (a tree, whose closures are given); a mechanism is returned unchanged.
 
-    Where the platform is guessed, ``GuessedPlatform`` (a ``UserWarning`` of ``hrsynth.errors``) is warned of.
+    Where base or platform are guessed, ``GuessedBase`` and ``GuessedPlatform`` (kinds of ``UserWarning`` in
+    ``hrsynth.errors``) are warned of. Where several links could be the platform, it stays open, and is asked for by the
+    first question that needs it.
 
     What a file does not say can be given: the ``platform`` link, the joints of the ``motors``, the links to ``observe``
     at their default segments, closures ``A:B[:type]`` that make the frames of two links (or points ``A@x,y,z`` in them)
@@ -111,7 +129,13 @@ def load(
                 "the file of a robot, or its name",
             )
         return robot
-    found = read(file_of(robot), overrides) if isinstance(robot, str | os.PathLike) else _of_urdf(robot, overrides)
+    if isinstance(robot, os.PathLike) or (isinstance(robot, str) and "<" not in robot):
+        found = read(file_of(robot), overrides)
+    else:
+        found = _read_content(robot, overrides)
+    for note in found.notes:
+        if note.kind == "guess" and ("the base is" in note.text or "it is the base" in note.text):
+            warn_caller(f"{found.name}: {note.text}", GuessedBase)
     if found.choice is not None and found.choice.chosen == "guess":
         warn_caller(
             f"{found.name}: the platform is link {found.platform!r}, {found.choice} "
@@ -121,25 +145,56 @@ def load(
     return found
 
 
-def _of_urdf(robot: URDF, overrides: Overrides) -> Mechanism:
-    """The mechanism of an object of yourdfpy; its meshes lie where that looks for them. Raises ``BadRequest`` for
-    another object."""
-    from yourdfpy import URDF
-
-    if not isinstance(robot, URDF):
-        raise BadRequest("a robot's file", robot, f"{NAMED}, a yourdfpy.URDF")
+def _read_content(robot: Any, overrides: Overrides) -> Mechanism:
+    """The mechanism of text, of an open file, which is read where it lies if it has what lies there, or of an object of
+    yourdfpy, whose meshes lie where that looks for them. Raises ``BadRequest`` for anything else."""
+    looked_in, name = None, str(getattr(robot, "name", ""))
+    if isinstance(robot, str):
+        data: Any = robot
+    elif callable(getattr(robot, "read", None)):
+        data = robot.read()
+    elif type(robot).__module__.partition(".")[0] == "yourdfpy" and hasattr(robot, "write_xml_string"):
+        data, name = robot.write_xml_string(), ""
+        looked_in = getattr(getattr(robot, "_filename_handler", None), "keywords", {}).get("dir")
+    else:
+        data = None
+    data = data.encode() if isinstance(data, str) else data
+    if not isinstance(data, bytes):
+        raise BadRequest("a robot's file", _short(robot), LOADED)
+    if os.path.isfile(name) and Path(name).read_bytes() == data:
+        return read(Path(name), overrides)
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "robot.urdf"
-        robot.write_xml_file(str(file))
-        found = read(file, overrides)
-    looked_in = getattr(getattr(robot, "_filename_handler", None), "keywords", {}).get("dir")
+        file = Path(folder) / f"robot{Path(name).suffix or '.urdf'}"
+        file.write_bytes(data)
+
+        def said(text: str) -> str:
+            whole = text.replace(str(file), GIVEN).replace(folder, NOWHERE)
+            return shorten_text(
+                re.sub(rf"\S{{{MOST_TOLD},}}", lambda word: shorten_text(word[0], MOST_TOLD), whole), 300
+            )
+
+        try:
+            found = read(file, overrides)
+        except BadRobotFile as error:
+            raise BadRobotFile(
+                replace(each, file=said(each.file), what=said(each.what), value=each.value and said(each.value))
+                for each in error.defects
+            ) from None
+        except HrsynthError as error:
+            error.file, error.args = None, (said(str(error)),)
+            raise
     return replace(found, file=str(Path(looked_in) / f"{found.name}.urdf") if looked_in else None, sha256=None)
+
+
+def _short(value: object) -> object:
+    """A value that is told, whole where that is short."""
+    return value if len(repr(value)) <= MOST_TOLD else shorten_text(str(value), MOST_TOLD - 2)
 
 
 def file_of(robot: str | os.PathLike[str]) -> Path:
     """The file that a name or a path stands for; raises ``BadRequest`` for a name of no robot."""
-    if not isinstance(robot, str | os.PathLike) or robot == "":
-        raise BadRequest("a robot's file", robot, NAMED)
+    if not isinstance(robot, str | os.PathLike) or robot == "" or {"\n", "<"} & {*str(robot)}:
+        raise BadRequest("a robot's file", _short(robot), NAMED)
     path = Path(robot)
     if isinstance(robot, str) and robot.startswith(PREFIX) and not os.path.exists(robot):
         return _file_by_name(
@@ -160,7 +215,9 @@ def _file_by_name(name: str, files: dict[str, Path], what: str, command: str) ->
     if name in files:
         return files[name]
     close = difflib.get_close_matches(name, files, n=5) or list(files)
-    raise BadRequest(what, name, f"a file, or a name that `hrsynth {command}` lists, such as " + ", ".join(close[:12]))
+    raise BadRequest(
+        what, _short(name), f"a file, or a name that `hrsynth {command}` lists, such as " + ", ".join(close[:12])
+    )
 
 
 def targets(path: str | Path, dialect: str | None = None) -> tuple[Path, ...]:

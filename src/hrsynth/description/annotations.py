@@ -93,7 +93,8 @@ def _camera(said: dict[str, str]) -> NamedCamera:
 
 def annotations_of(robot: Mechanism, *, motors: bool = False) -> Iterable[tuple[str, str]]:
     """Key and text of all that is added for a robot, in order."""
-    yield "formation" if robot.formation else "platform", quote(robot.platform)
+    if not robot.open_platform:
+        yield "formation" if robot.formation else "platform", quote(robot.platform)
     if robot.turns is not None:
         yield "turns", str(robot.turns).lower()
     if robot.camera is not None:

@@ -52,12 +52,14 @@ def understood(file: RobotFile, overrides: Overrides) -> Mechanism:
         from .assembly.generic import with_generic_zero
 
         robot = _part(build(robot, overrides), overrides)
-        return robot if overrides.keyframe is not None else with_generic_zero(robot)
+        return robot if overrides.keyframe is not None or robot.open_platform else with_generic_zero(robot)
     return _part(robot, overrides)
 
 
 def _part(robot: Mechanism, overrides: Overrides) -> Mechanism:
     """What of a robot is asked about: all of it, or what lies between base and platform; and what is watched."""
+    if overrides.base is not None or overrides.observe is not None:
+        robot.require_platform()
     if overrides.base is not None:
         robot = spanning(between(robot, overrides.base, overrides.platform or robot.platform))
     if overrides.unit is None and robot.length > LARGEST_ROBOT:

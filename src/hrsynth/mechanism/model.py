@@ -6,7 +6,7 @@ therefore needs no frames of its own: a centre and its axes say all. SI units, r
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
@@ -14,11 +14,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import BadMechanism
+from ..errors import BadMechanism, BadRequest, NoPlatform
 from ..geometry.vectors import Array, frozen, inverse, unit
 from ..results import Result, Value, content
 from ..tolerances import NO_SPREAD, SAME_GEOMETRY
-from .graphs import Adjacency, adjacency, spanning_forest
+from .graphs import Adjacency, adjacency, component, spanning_forest
 from .observation import Observation
 from .sights import NamedCamera
 from .wrist import Wrist
@@ -209,7 +209,8 @@ class Note:
 
 @dataclass(frozen=True)
 class PlatformChoice:
-    """How the platform was chosen: by the ``file``, an ``option`` or a ``guess``; and the reason, in words."""
+    """How the platform was chosen: by the ``file``, an ``option`` or a ``guess``; and the reason, in words. Where it is
+    left ``open``, the reason says why, and with what it would be named."""
 
     chosen: str
     reason: str
@@ -222,6 +223,13 @@ NAMED = PlatformChoice("file", "named in the file")
 GIVEN = PlatformChoice("option", "given by --platform")
 FIRST = PlatformChoice("file", "the first of the bodies that observe or are observed")
 """Of a formation."""
+
+
+def at_base(base: str, joints: Sequence[Any]) -> list[str]:
+    """The joints at the base, and at what is fixed to it, that could be driven, by their names."""
+    fixed = component(adjacency((base,), (joint.links for joint in joints if joint.type is JointType.FIXED)), base)
+    moving = (joint for joint in joints if joint.type not in (JointType.FIXED, JointType.FREE))
+    return [joint.name for joint in moving if fixed & {*joint.links}]
 
 
 def _counted(bound: float, joint: Joint) -> float:
@@ -345,7 +353,34 @@ class Mechanism(Result, shown_as="robot"):
     @property
     def platform_words(self) -> str:
         """The platform, or the bodies of a formation, and how it was chosen."""
-        return ", ".join(self.bodies) + ("" if self.choice is None else f" ({self.choice})")
+        bodies = "none" if self.open_platform else ", ".join(self.bodies)
+        return bodies + ("" if self.choice is None else f" ({self.choice})")
+
+    @property
+    def open_platform(self) -> bool:
+        """Whether the file names no platform and several could be: ``platform`` is then only the first of these."""
+        return self.choice is not None and self.choice.chosen == "open"
+
+    def require_platform(self) -> None:
+        """Raise ``NoPlatform`` where the platform is open."""
+        if self.open_platform:
+            raise NoPlatform(f"{self.file or self.name}: {self.choice}")
+
+    @property
+    def proposed_motors(self) -> str | None:
+        """That no joint is driven, and which could be: those at the base; None where there are none of either."""
+        names = at_base(self.base, list(self.joints.values()))
+        if not names or any(joint.actuated for joint in self.joints.values()):
+            return None
+        return f"no joint is driven: --motors {','.join(names)} could be (the joints at the base)"
+
+    def require_motors(self) -> None:
+        """Raise ``BadRequest`` where no joint is driven."""
+        if not any(joint.actuated for joint in self.joints.values()):
+            told = (self.proposed_motors or "").removeprefix("no joint is driven: ")
+            raise BadRequest(
+                f"{self.name} has no motor", None, f"one or more: --motors names them{told and f'; {told}'}"
+            )
 
     @cached_property
     def adjacency(self) -> Adjacency:

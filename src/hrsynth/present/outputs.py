@@ -326,6 +326,7 @@ OUTPUTS = {
     ),
     "legs": Outputs("text.robots:legs"),
     "lint": Outputs("text.lint:lint"),
+    "loop_check": Outputs("text.poses:loop_check"),
     "modes": Outputs(
         "text.poses:modes",
         (

@@ -73,7 +73,8 @@ def record(command: str, robot: Mechanism | None, fields: dict[str, Any]) -> str
     head: dict[str, Any] = {}
     if robot is not None:
         chosen = None if robot.choice is None else {"chosen": robot.choice.chosen, "reason": robot.choice.reason}
-        head = {"robot": robot.name, "platform": {"link": robot.platform, **(chosen or {})}}
+        link = None if robot.open_platform else robot.platform
+        head = {"robot": robot.name, "platform": {"link": link, **(chosen or {})}}
     text = io.StringIO()  # json.dumps keeps all small pieces of the text at once
     json.dump(
         {**head, "command": command, "version": __version__, **fields},

@@ -9,6 +9,7 @@ import pytest
 
 from description.foreign.examples import TREE, A, B, C, D, _frame, urdf, words
 from description.foreign.test_dialects import lines, mobility
+from hrsynth.analysis.asked import observe
 from hrsynth.description import formats, load
 from hrsynth.description.assembly.candidates import ClosureCandidate, closure_candidates
 from hrsynth.description.jointgraph import JointGraph
@@ -65,7 +66,7 @@ def test_a_robot_without_a_loop_is_told_to_have_none(tmp_path: Path):
     assert "nothing in the file closes a loop" in told
     assert "--close hook:eye" in told
     with pytest.raises(BadRequest, match=r"closes a loop.*--close hook:eye"):
-        load(path)
+        observe(load(path))
     path.write_text(urdf(""))
     told = next(note.text for note in load(path, platform="bar").notes if note.kind == "open")
     assert told.endswith("open chain")

@@ -12,7 +12,7 @@ import pytest
 import hrsynth
 from hrsynth.cli import execute
 from hrsynth.description import load
-from hrsynth.errors import BadRequest, GuessedPlatform
+from hrsynth.errors import BadRequest, GuessedBase, GuessedPlatform
 from hrsynth.mechanism import Mechanism
 
 
@@ -55,7 +55,8 @@ def read(folder: Path, text: str, **given: str) -> Mechanism:
     path = folder / "robot.urdf"
     path.write_text(text)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", GuessedPlatform)
+        for kind in (GuessedBase, GuessedPlatform):
+            warnings.simplefilter("ignore", kind)
         return load(path, **given)
 
 
@@ -79,7 +80,7 @@ def test_the_foot_that_two_rods_drive_is_the_platform(tmp_path: Path, names: tup
 
 def test_a_name_that_contradicts_the_structure_is_asked_about(tmp_path: Path):
     with pytest.raises(BadRequest, match=r"--platform LINK, such as toe, c, "):
-        read(tmp_path, ankle("c", ("toe", "b"), "revolute"))
+        hrsynth.observe(read(tmp_path, ankle("c", ("toe", "b"), "revolute")))
 
 
 def test_the_last_linkage_of_a_leg_is_asked_about(tmp_path: Path):
@@ -95,7 +96,7 @@ def test_the_last_linkage_of_a_leg_is_asked_about(tmp_path: Path):
         joint("up", "revolute", "lever", "b", "-0.06 0 0"),
     ]
     with pytest.raises(BadRequest, match=r"--platform LINK, such as .*a"):
-        read(tmp_path, robot(*joints, loops=last))
+        hrsynth.observe(read(tmp_path, robot(*joints, loops=last)))
     named = [each.replace('"a"', '"sole"') for each in joints]
     assert read(tmp_path, robot(*named, loops=last.replace('"a"', '"sole"'))).platform == "sole"
 
@@ -123,7 +124,7 @@ def floating(order: str, legs: int, driven: str = "", centre: str = "0 0 0") -> 
 @pytest.mark.parametrize("order", ["PPPRRR", "RRRPPP", "PRPRPR"])
 def test_six_freedoms_that_place_a_base_are_no_leg_and_a_sensor_is_no_platform(tmp_path: Path, order: str):
     with pytest.raises(BadRequest, match=r"such as lower_0, lower_1$"):
-        read(tmp_path, floating(order, 2))
+        hrsynth.observe(read(tmp_path, floating(order, 2)))
     found = read(tmp_path, floating(order, 2), platform="lower_1")
     assert (found.base, len(found.joints)) == ("trunk", 5)
     assert any("'trunk' floats on the joints float_0" in note.text for note in found.notes)

@@ -10,6 +10,7 @@ import pytest
 
 from description.foreign.examples import FILES, MJCF, TREE, A, B, C, D, at, ends, mjcf, urdf
 from description.foreign.test_dialects import lines, mobility
+from hrsynth.analysis.asked import observe
 from hrsynth.description import load
 from hrsynth.errors import BadMechanism, BadRequest, HeldByRounding, HrsynthError, LoopsNotClosed, RankUndecided
 from hrsynth.kinematics.configuration import ClosedConfiguration
@@ -476,7 +477,7 @@ def test_the_way_between_two_links_is_all_that_counts(tmp_path: Path):
 def test_candidates_are_named_where_no_guess_is_safe(tmp_path: Path):
     two = bars([("p", "left", "base", origin(0)), ("q", "right", "base", origin(1))], "")
     with pytest.raises(BadRequest, match="--platform LINK, such as left, right"):
-        read(tmp_path, two)
+        observe(read(tmp_path, two))
     assert at("base", A) == "0.0 0.0 0.0"
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from description.foreign.test_traps import read
-from hrsynth import check, derive, legs, modes
+from hrsynth import check, derive, legs, modes, observe
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import load
 from hrsynth.errors import BadRequest
@@ -273,7 +273,7 @@ def test_feet_are_offered_as_platforms(tmp_path: Path):
         + "</equality></mujoco>"
     )
     with pytest.raises(BadRequest) as caught:
-        read(tmp_path, walker, "xml")
+        observe(read(tmp_path, walker, "xml"))
     offered = str(caught.value).partition("such as ")[2].split(", ")
     assert offered[:2] == ["l_foot", "r_foot"]
     assert {"l_crank", "l_link", "r_crank", "r_link"} <= set(offered)

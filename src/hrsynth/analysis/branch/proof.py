@@ -69,9 +69,9 @@ def branch(robot: RobotLike, box: MotorBox = None, *, effort: Cells = BRANCH_CEL
         raise BadRequest("effort", effort, "1 cell or more")
     given = as_robot(robot)
     mechanism = given if isinstance(given, Mechanism) else given.robot
+    mechanism.require_platform()
+    mechanism.require_motors()
     motors = [name for name, joint in mechanism.joints.items() if joint.actuated]
-    if not motors:
-        raise BadRequest(f"{mechanism.name} has no motor", None, "one or more: --motors names them")
     asked = parsed_box(box)
     if not all(low <= _zero(mechanism, name) <= high for name, (low, high) in asked.items()):
         mechanism = at_file_zero(mechanism) or mechanism

@@ -88,7 +88,7 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
         mechanism = spanning(mechanism)
         if overrides.keyframe != STAY:
             mechanism = _away_from_singular(mechanism)
-    if graph.platform is None:
+    if graph.platform is None and not mechanism.open_platform:
         mechanism = without_coordinates(mechanism)
     return with_weighed_motors(mechanism)
 
@@ -100,8 +100,7 @@ def _platform(graph: JointGraph, overrides: Overrides, base: str) -> tuple[str, 
     first = guess.formation(graph, base) if graph.platform is None and graph.formation else graph.platform
     if first is not None:
         return first, FIRST if graph.formation else NAMED
-    link, why = guess.platform(graph, overrides.base or base)
-    return link, PlatformChoice("guess", why)
+    return guess.platform(graph, overrides.base or base)
 
 
 def deviation(digits: Digits, length: float) -> float:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...errors import BadRequest
-from ...mechanism.model import Mechanism, Note
+from ...mechanism.model import Mechanism, Note, at_base
 from .. import formats
 from ..jointgraph import JointGraph, JointSpec
 from ..overrides import Overrides
@@ -40,6 +40,11 @@ class ImportChoices:
     def moving(self) -> tuple[JointSpec, ...]:
         """The joints that can be driven."""
         return tuple(joint for joint in self.joints if joint.kind.freedoms)
+
+    @property
+    def proposed_motors(self) -> list[str]:
+        """The joints that could be driven where nothing says which are."""
+        return at_base(self.bases[0], self.joints)
 
 
 def choices(path: Path, overrides: Overrides) -> ImportChoices:

@@ -13,7 +13,7 @@ from ...budgets import LARGEST_GUESSED
 from ...errors import BadRequest
 from ...geometry.vectors import Array, inverse
 from ...mechanism import graphs
-from ...mechanism.model import JointType
+from ...mechanism.model import JointType, PlatformChoice
 from ...tolerances import SAME_DIRECTION, SAME_POINT
 from ..jointgraph import JointGraph, JointSpec, first_body
 
@@ -145,12 +145,12 @@ def formation(graph: JointGraph, base: str) -> str | None:
     return found
 
 
-def platform(graph: JointGraph, base: str) -> tuple[str, str]:
+def platform(graph: JointGraph, base: str) -> tuple[str, PlatformChoice]:
     """The link that is guessed, and why: the one that most ways connect to the base; else the only one with the name of
     a foot or tool; else the one that several loops close; else the only frame on a fixed joint; else the link farthest
-    away.
+    away. Where several are as good, it stays open: the first of the candidates.
 
-    Raises ``BadRequest`` with the candidates where several are as good.
+    Raises ``BadRequest`` where no link moves.
     """
     bodies = _RigidBodies(graph, base)
     if len(bodies.members) == 1:
@@ -159,13 +159,11 @@ def platform(graph: JointGraph, base: str) -> tuple[str, str]:
     if link is None:
         names = bodies.platform_candidates(rivals)
         chain = "".join(f"; {note.text}" for note in graph.notes if note.kind == "open")
-        raise BadRequest(
-            f"{graph.file}: the file does not say which link is the platform, and several could be{chain}",
-            None,
-            "--platform LINK, such as " + ", ".join(names[:12]) + (" …" if names[12:] else ""),
-        )
+        such = ", ".join(names[:12]) + (" …" if names[12:] else "")
+        why = f"the file does not say which link is the platform, and several could be{chain}"
+        return names[0], PlatformChoice("open", f"{why}, allowed: --platform LINK, such as {such}")
     graph.note("guess", f"the platform is link {link!r}, {why} (--platform LINK to change it)")
-    return link, why
+    return link, PlatformChoice("guess", why)
 
 
 def platforms(graph: JointGraph, base: str) -> tuple[list[str], str]:

@@ -83,7 +83,7 @@ def _ends(file: LintedFile) -> Iterator[Spot]:
             )
     if match is None:
         return
-    for role in ("base", "platform"):
+    for role in ("base",) if match.one.open_platform or match.other.open_platform else ("base", "platform"):
         one, two = getattr(match.one, role), getattr(match.other, role)
         if match.links.get(one) != two:
             yield Spot(match.one.links[one].line, f"the {role} is {one!r} here, {two!r} there")

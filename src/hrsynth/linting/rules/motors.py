@@ -23,7 +23,7 @@ def _none(file: LintedFile) -> Iterator[Spot]:
 
 def _few(file: LintedFile) -> Iterator[Spot]:
     robot, found = file.mechanism, nearby(file)
-    if robot is None or found is None or not _held_joints(robot):
+    if robot is None or found is None or not _held_joints(robot) or robot.open_platform:
         return
     whole, rest = found.platform(), found.platform(_held_joints(robot))
     if whole and rest:

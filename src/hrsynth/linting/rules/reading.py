@@ -25,6 +25,8 @@ def _refused(file: LintedFile) -> Iterator[Spot]:
 def _asks(file: LintedFile) -> Iterator[Spot]:
     if isinstance(file.refusal, BadRequest):
         yield Spot(None, " ".join(str(file.refusal).removeprefix(f"{file.file}: ").split()))
+    elif file.mechanism is not None and file.mechanism.open_platform:
+        yield Spot(None, str(file.mechanism.choice))
 
 
 def find_notes(*kinds: str, text: str = "") -> Callable[[LintedFile], Iterator[Spot]]:

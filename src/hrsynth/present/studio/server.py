@@ -226,7 +226,7 @@ class StudioServer:
 def require_libraries() -> None:
     """Raise ``NeedsPosix`` or ``MissingExtra`` where what serves the page is not there."""
     require_posix("the studio", "fcntl", "resource")
-    if None in map(find_spec, ("starlette", "uvicorn", "websockets")):
+    if None in map(find_spec, ("h11", "starlette", "uvicorn", "websockets")):
         raise MissingExtra("serving a page", "studio")
 
 

@@ -19,6 +19,8 @@ from ...tolerances import NOISE, RANK_GAP
 from .robots import NO_MATRIX, formation
 from .tables import (
     GAP,
+    LINE,
+    NAMES,
     NOT_BOUNDED,
     Rows,
     camera,
@@ -29,12 +31,13 @@ from .tables import (
     joint_rows,
     known_row,
     listing,
+    wrap_lines,
 )
 
 if TYPE_CHECKING:
     from ...analysis.aspects.atlas import Atlas, ModePair
     from ...analysis.aspects.path import PathAnswer, SampledRoad
-    from ...analysis.check import Check, GridCheck
+    from ...analysis.check import Check, Checked, GridCheck, LoopCheck
     from ...analysis.modes.assembly_mode import AssemblyMode
     from ...analysis.modes.modes import AssemblyModes
     from ...analysis.modes.near import NearMode
@@ -74,8 +77,7 @@ def check(found: Check) -> str:
         rows += [*GAP, ("pose", str(posture.pose)), *_posture(posture, found.length, found.setting)]
     for each in found.unreached:
         rows += [*GAP, ("pose", each.pose), ("not reached", each.reason)]
-    redundant = [f"the loop {each.loop}: {each.rows} of its constraints" for each in found.redundant]
-    rows += [*GAP, ("redundant", redundant or "no constraint")]
+    rows += [*GAP, _redundant_row(found)]
     if found.grid is not None:
         counts = Counter(found.grid.states)
         axes = zip(found.grid.grid.shape, found.grid.grid.names, strict=True)
@@ -95,6 +97,35 @@ def check(found: Check) -> str:
             )
         )
     return listing(rows)
+
+
+def _redundant_row(found: Checked) -> tuple[str, str | list[str]]:
+    """The redundant constraints of each loop."""
+    each_loop = [f"the loop {each.loop}: {each.rows} of its constraints" for each in found.redundant]
+    return "redundant", each_loop or "no constraint"
+
+
+def loop_check(found: LoopCheck) -> str:
+    """What the loops alone say, and what it takes to say more."""
+    told = found.constraints
+    counted = f"{told.weakest:.2g} is the weakest singular value that counts, {told.dropped:.1g} the strongest that "
+    values = [f"{told.rank} independent of {told.rows}; as parts of the largest,"]
+    values += [f"{counted}does not (gap {told.gap:.1e}, needed {RANK_GAP:.0e})"]
+    return listing(
+        [
+            ("robot", found.robot.name),
+            (
+                "mobility",
+                f"{found.mobility.total}: {told.coordinates} coordinates, {told.rank} independent constraints",
+            ),
+            ("constraints", values if told.rank else f"rank 0 of {told.rows}"),
+            ("loops", wrap_lines(", ".join(told.loops), LINE - NAMES) if told.loops else "none, an open tree"),
+            _redundant_row(found),
+            ("lengths in", f"{found.length:.4g} m (the characteristic length), angles in radians"),
+            *GAP,
+            ("to say more", [line for each in found.more for line in wrap_lines(each, LINE - NAMES)]),
+        ]
+    )
 
 
 def _free(grid: GridCheck) -> Iterator[str]:

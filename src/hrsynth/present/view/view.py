@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,6 +16,7 @@ from ...geometry.vectors import Array, orient_axis
 from ...kinematics.coordinates import Coordinates
 from ...kinematics.platform_motion import PlatformMotion
 from ...mechanism import Mechanism
+from ...mechanism.model import PlatformChoice
 from ...mechanism.observation import Observation
 from ...mechanism.observations.direction import Direction
 from ...options import option
@@ -156,20 +157,25 @@ def view(
     A 3D view of a robot, with ``hidden`` also of its hidden robot: every position of a slider is a closed
     configuration in which only one of the platform's coordinates differs from the zero configuration.
 
-    ``observe``, ``camera`` and ``see`` are as for ``derive``, which also says what is raised. Assembly modes that
-    cannot be listed and missing meshes are reported in ``notes``.
+    ``observe``, ``camera`` and ``see`` are as for ``derive``, which also says what is raised; without ``hidden``
+    neither a platform nor a segment is needed: the first link that could be the platform is moved, and ``notes`` say
+    so. Assembly modes that cannot be listed and missing meshes are reported in ``notes``.
 
     >>> hrsynth.view("3rrr_m1")
     <View: 3rrr_m1, 3 sliders, 1 other assembly modes>
     """
-    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
+    notes: tuple[str, ...] = ()
+    if isinstance(robot, Mechanism) and robot.open_platform and not hidden:
+        notes = (f"the sliders move link {robot.platform!r}: {robot.choice}",)
+        robot = replace(robot, choice=PlatformChoice("guess", "the first that could be"))
+    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed, blind=not hidden)
     derivation = derive(setting, seed=seed) if hidden else None
     other = None if derivation is None else derivation.hidden
     mover = Mover.of(setting, other)
     tell("sliders")
     sliders = mover.sliders()
     tell("modes")
-    found, notes = mode_outlines(setting)
+    found, unlisted = mode_outlines(setting)
     shapes, missing = meshes(setting)
     home = mover.with_error(mover.home)
     states = (home, *(state for slider in sliders for state in slider.states))
@@ -207,7 +213,7 @@ def view(
         arrows,
         found,
         plane_normal(setting.motion),
-        (*notes, *missing),
+        (*notes, *unlisted, *missing),
     )
 
 

@@ -81,7 +81,8 @@ class _NativeWriter:
             self._transmissions(root, order)
             inner = [fragment for fragment in robot.xml if _OWN.match(fragment)]
             xml.restore(root, [fragment for fragment in robot.xml if fragment not in inner])
-            root.append(self._own(inner))
+            if len(own := self._own(inner)) or not self.mechanism.open_platform:
+                root.append(own)
         except ValueError as error:  # lxml: characters that no XML document can hold
             raise BadRequest("a name cannot be written", robot.name, str(error)) from None
         return xml.text_of(root)
@@ -162,7 +163,7 @@ class _NativeWriter:
         element = etree.Element("hrsynth")
         if all(joint.in_tree for joint in robot.joints.values()):
             element.set("serial", "true")
-        if not robot.formation:
+        if not robot.formation and not robot.open_platform:
             said = {} if robot.turns is None else {"turns": str(robot.turns).lower()}
             etree.SubElement(element, "platform", said, link=robot.platform)
         if robot.camera is not None:

@@ -117,10 +117,16 @@ class _TolerantReader(UrdfReader):
         self.require_sound()
 
     def add_gears(self, graph: JointGraph) -> None:
-        """Couplings name links, mimics name joints."""
-        carrier = {joint.links[1]: name for name, joint in graph.joints.items() if joint.in_tree}
+        """Couplings name links, which may be fixed to what their joints carry; mimics name joints."""
+        carrier = {joint.links[1]: joint for joint in graph.joints.values() if joint.in_tree}
+
+        def carrying(link: str) -> str | None:
+            while (joint := carrier.get(link)) is not None and joint.type is JointType.FIXED:
+                link = joint.links[0]
+            return None if joint is None else joint.name
+
         for coupling in self.couplings:
-            ends = [carrier.get(link) for link in (coupling.predecessor, coupling.successor)]
+            ends = [carrying(link) for link in (coupling.predecessor, coupling.successor)]
             if None in ends:
                 self.defect(coupling.line, f"coupling {coupling.name!r}: a link that no joint carries")
             else:

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 from ....budgets import LARGEST_FILE, MOST_ELEMENTS, XACRO_SECONDS
+from ....errors import MissingExtra
 from ... import xml
 
 
@@ -24,15 +25,11 @@ def is_needed(root: xml.Element) -> bool:
 
 
 def expand(path: Path) -> xml.Element:
-    """The document that a xacro file stands for; raises ``BadRobotFile``."""
+    """The document that a xacro file stands for; raises ``BadRobotFile``, ``MissingExtra``."""
     import subprocess
 
     if importlib.util.find_spec("xacro") is None:
-        raise xml.refusal(
-            path,
-            "a xacro file, and the package xacro is not installed",
-            "the extra hrsynth[xacro], or the URDF that it expands to",
-        )
+        raise MissingExtra(f"{path}: a xacro file", "xacro")
     process = Path(__file__).with_name("xacro_process.py")
     command = [sys.executable, "-P", str(process), str(path.resolve()), str(LARGEST_FILE), str(MOST_ELEMENTS)]
     try:

@@ -145,12 +145,11 @@ def offers(request: Request, found: ImportChoices) -> Iterator[dict[str, Any]]:
     if len(found.bases) > 1:
         yield offer("base", said.get("base", found.bases[0]), "no joint carries it", list(found.bases))
     driven = [joint.name for joint in found.moving if joint.motor is not None]
-    on_base = [joint.name for joint in found.moving if found.bases[0] in joint.links]
     yield offer(
         "motors",
         list(said.get("motors", driven)),
         "chosen" if "motors" in said else "as the file says",
-        [driven, on_base],
+        [driven, found.proposed_motors],
     )
     if found.candidates or "close" in said:
         near = [each.wish for each in found.candidates]
