@@ -57,7 +57,7 @@ def test_closures_parts_and_frozen_joints_from_the_command_line(call, tmp_path: 
     assert remarks == [
         "hrsynth: open: nothing in the file closes a loop: it is read as an open chain",
         "hrsynth: ignored: 1 links that are not between 'one' and 'three': base",
-        "hrsynth: no joint is driven: --motors q could be (the joints at the base)",
+        "hrsynth: no joint is driven: --motors q,r could be (all joints: no loop is closed)",
     ]
     status, out, _ = call("check", path, "--freeze", "p", "--json")
     assert json.loads(out)["configurations"][0]["dof"] == 2

@@ -225,11 +225,14 @@ FIRST = PlatformChoice("file", "the first of the bodies that observe or are obse
 """Of a formation."""
 
 
-def at_base(base: str, joints: Sequence[Any]) -> list[str]:
-    """The joints at the base, and at what is fixed to it, that could be driven, by their names."""
+def likely_motors(base: str, joints: Sequence[Any]) -> tuple[list[str], str]:
+    """The joints that could be driven, by their names, and which these are: those at the base and at what is fixed to
+    it; where no loop is closed all."""
     fixed = component(adjacency((base,), (joint.links for joint in joints if joint.type is JointType.FIXED)), base)
     moving = (joint for joint in joints if joint.type not in (JointType.FIXED, JointType.FREE))
-    return [joint.name for joint in moving if fixed & {*joint.links}]
+    if len(joints) < len({link for joint in joints for link in joint.links}):
+        return [joint.name for joint in moving], "all joints: no loop is closed"
+    return [joint.name for joint in moving if fixed & {*joint.links}], "the joints at the base"
 
 
 def _counted(bound: float, joint: Joint) -> float:
@@ -368,11 +371,11 @@ class Mechanism(Result, shown_as="robot"):
 
     @property
     def proposed_motors(self) -> str | None:
-        """That no joint is driven, and which could be: those at the base; None where there are none of either."""
-        names = at_base(self.base, list(self.joints.values()))
+        """That no joint is driven, and which could be; None where there are none of either."""
+        names, which = likely_motors(self.base, list(self.joints.values()))
         if not names or any(joint.actuated for joint in self.joints.values()):
             return None
-        return f"no joint is driven: --motors {','.join(names)} could be (the joints at the base)"
+        return f"no joint is driven: --motors {','.join(names)} could be ({which})"
 
     def require_motors(self) -> None:
         """Raise ``BadRequest`` where no joint is driven."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...errors import BadRequest
-from ...mechanism.model import Mechanism, Note, at_base
+from ...mechanism.model import Mechanism, Note, likely_motors
 from .. import formats
 from ..jointgraph import JointGraph, JointSpec
 from ..overrides import Overrides
@@ -44,7 +44,7 @@ class ImportChoices:
     @property
     def proposed_motors(self) -> list[str]:
         """The joints that could be driven where nothing says which are."""
-        return at_base(self.bases[0], self.joints)
+        return likely_motors(self.bases[0], self.joints)[0]
 
 
 def choices(path: Path, overrides: Overrides) -> ImportChoices:
