@@ -487,6 +487,7 @@ def test_check_json_is_the_contract(run):
     assert first.keys() == {
         "pose",
         "beyond",
+        "coordinates",
         "flat_wrists",
         "mobility",
         "dof",

@@ -14,6 +14,8 @@ LARGEST_GRID = 100_000
 FARTHEST_POSE = 1e9
 """Metres or radians in a pose beyond which it is taken for a slip: numbers no longer tell nearby poses apart
 there."""
+FARTHEST_JOINT = 100.0
+"""Metres or radians of a joint from which on it is taken for a slip: the way there is made in small steps."""
 LARGEST_ROBOT = 20.0
 """Characteristic length (m) above which it is asked whether a file has millimetres."""
 LARGEST_NUMBER = 1e9

@@ -126,3 +126,31 @@ def test_a_guess_of_the_base_is_a_warning_at_the_line_that_asks(ask: Callable[[s
     with warnings.catch_warnings():
         warnings.simplefilter("error", GuessedBase)
         load("3rrr_m1")
+
+
+@pytest.mark.parametrize("ends", [b"\n", b"\r\n", b"\r"])
+@pytest.mark.parametrize("mark", [b"", b"\xef\xbb\xbf"])
+def test_an_open_file_is_read_where_it_lies_whatever_ends_its_lines(tmp_path: Path, ends: bytes, mark: bytes):
+    path = tmp_path / "robot.xml"
+    path.write_bytes(mark + next(iter(ONE_FILE.values())).encode().replace(b"\n", ends))
+    with path.open(encoding="utf-8-sig" if mark else "utf-8") as text, path.open("rb") as data:
+        assert load(text).file == load(data).file == str(path)
+
+
+def test_text_is_decoded_whatever_encoding_it_declares():
+    text = "<?xml version='1.0' encoding='{}'?>" + URDF["urdf+"].replace("four_bar", "vierüber")
+    for encoding in ("utf-8", "iso-8859-1", "utf-16"):
+        assert load(text.format(encoding) if "{" not in URDF["urdf+"] else text).name == "vierüber"
+
+
+def test_files_that_cannot_be_read_are_one_line(tmp_path: Path):
+    path = tmp_path / "robot.urdf"
+    path.write_text("<robot name='a'/>")
+    stream = path.open()
+    stream.close()
+    named = io.StringIO("<robot name='a'/>")
+    named.name = "x." + "y" * 300
+    for given in (stream, path.open("ab"), named, "<robot name='\ud800'/>"):
+        with pytest.raises(HrsynthError) as caught:
+            load(given)
+        assert len(caught.value.lines()) == 1

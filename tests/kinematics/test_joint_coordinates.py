@@ -21,6 +21,7 @@ from hrsynth.kinematics.walking import random_walk
 from hrsynth.mechanism import Limits, Mechanism
 from hrsynth.mechanism.pose import JointPose, asked_pose
 from kinematics.robots import ROBOTS
+from strategies import split
 
 PIECES = 300
 
@@ -114,9 +115,14 @@ def test_motors_that_are_not_named_stay() -> None:
         ("motors:elbow_1=0.1", "unknown among its motors"),
         ("joints:nothing=0.1", "unknown among its joints"),
         ("joints:elbow_1=0.1/0.2", "coordinates of elbow_1"),
-        ("joints:elbow_1=0.1,elbow_1=0.2", "each name once"),
+        ("joints:elbow_1=0.1,elbow_1=0.2", "given twice"),
         ("motors:0.1,shoulder_2=0.1", "motors of a pose"),
-        ("motors:nan,0,0", "finite"),
+        ("motors:nan,0,0", "not a number"),
+        ("motors:1e300,0,0", "not a number"),
+        ({"motors": [10**400, 0, 0]}, "not a number"),
+        ({"motors": [True, 0, 0]}, "not a number"),
+        ({"motors": [0, 0, 0], "x": 0.1}, "one of them"),
+        ("motor:0.1", "by joints or motors"),
         ("motors:", "motors of a pose"),
         ({"motors": "0.1,x,0.1"}, "motors of a pose"),
         ({"joints": 3}, "joints of a pose"),
@@ -176,3 +182,33 @@ def test_joints_that_the_normal_form_has_joined_are_told() -> None:
     assert isinstance(at, ClosedConfiguration)
     robot = setting.robot
     assert {*read_joints(at)} == {joint.name for joint in counted_joints(robot)}
+
+
+def test_free_parts_stay_within_limits() -> None:
+    robot = limited("i4l", "guide_2", 0.165)
+    (found,) = asked_at(ObservedRobot.of(robot), [asked_pose("joints:guide_1=-0.2")])
+    if isinstance(found, PoseNotReached):
+        assert "guide_2 is at its limit" in found.reason
+    else:
+        assert abs(read_joints(found)["guide_2"][0]) <= 0.165
+
+
+@pytest.mark.parametrize("angle", [4.0, -4.0])
+def test_turns_are_not_counted_modulo_a_whole_one(angle: float) -> None:
+    """Also where the normal form has other joints than the file."""
+    robot = hrsynth.load("rrrrr_m1")
+    twisted = split(robot, np.random.default_rng(2))
+    for each in (robot, twisted):
+        crank = next(joint.name for joint in each.joints.values() if joint.actuated)
+        try:
+            at = hrsynth.check(each, at=f"joints:{crank}={angle}").postures[0]
+        except PoseNotReached:
+            continue
+        assert at.coordinates is not None
+        assert at.coordinates.motors[crank] == pytest.approx(angle, abs=1e-8)
+
+
+def test_degrees_of_a_slide_are_refused() -> None:
+    for given in ("motors:10deg,0,0", "joints:slide_1=10deg"):
+        with pytest.raises(BadRequest, match="slide_1 slides"):
+            hrsynth.check("3rps", at=given)

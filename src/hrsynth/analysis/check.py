@@ -9,7 +9,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from ..batch.reach import grid_dependence, sweep
-from ..errors import BadMechanism, NoPlatform, NoSegment, PlaneNotMet, PoseNotReached, RankUndecided
+from ..errors import BadMechanism, NoPlatform, NoSegment, NotSampled, PlaneNotMet, PoseNotReached, RankUndecided
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.pinocchio_model import PinocchioModel
 from ..kinematics.sampled_mode import STEPS, firmest, require_motions
@@ -249,7 +249,7 @@ def check(
     cells = None if grid is None else Grid.parse(grid)
     try:
         setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed).telling(poses)
-    except (NoPlatform, NoSegment, BadMechanism) as error:
+    except (NoPlatform, NoSegment, BadMechanism, NotSampled) as error:
         if not isinstance(robot, Mechanism) or poses or any(each is not None for each in (cells, observe, camera, see)):
             raise
         return LoopCheck.of(robot, str(error).removeprefix(f"{robot.file or robot.name}: "))

@@ -7,12 +7,14 @@ import difflib
 import os
 import re
 import tempfile
+from codecs import BOM_UTF8
 from collections.abc import Iterable
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
+from ..budgets import LARGEST_FILE
 from ..errors import (
     BadRequest,
     BadRobotFile,
@@ -45,6 +47,8 @@ LOADED = f"{NAMED}, an open file, XML text, a yourdfpy.URDF"
 """What is read."""
 MOST_TOLD = 60
 """Letters of what was given that an error tells."""
+MOST_WARNED = 400
+"""Letters of a warning."""
 GIVEN, NOWHERE = "the given text", "(nowhere, as no file is given)"
 """What errors call text, and the folder of the files that it names."""
 
@@ -135,13 +139,10 @@ def load(
         found = _read_content(robot, overrides)
     for note in found.notes:
         if note.kind == "guess" and ("the base is" in note.text or "it is the base" in note.text):
-            warn_caller(f"{found.name}: {note.text}", GuessedBase)
+            warn_caller(shorten_text(f"{found.name}: {note.text}", MOST_WARNED), GuessedBase)
     if found.choice is not None and found.choice.chosen == "guess":
-        warn_caller(
-            f"{found.name}: the platform is link {found.platform!r}, {found.choice} "
-            f"(platform={found.platform!r} to say so)",
-            GuessedPlatform,
-        )
+        text = f"{found.name}: the platform is link {found.platform!r}, {found.choice}"
+        warn_caller(shorten_text(f"{text} (platform={found.platform!r} to say so)", MOST_WARNED), GuessedPlatform)
     return found
 
 
@@ -152,19 +153,26 @@ def _read_content(robot: Any, overrides: Overrides) -> Mechanism:
     if isinstance(robot, str):
         data: Any = robot
     elif callable(getattr(robot, "read", None)):
-        data = robot.read()
+        try:
+            data = robot.read(LARGEST_FILE + 1)
+        except (OSError, ValueError):
+            raise BadRequest("an open file", _short(robot), "one that is open for reading") from None
     elif type(robot).__module__.partition(".")[0] == "yourdfpy" and hasattr(robot, "write_xml_string"):
         data, name = robot.write_xml_string(), ""
         looked_in = getattr(getattr(robot, "_filename_handler", None), "keywords", {}).get("dir")
     else:
         data = None
-    data = data.encode() if isinstance(data, str) else data
+    decoded = isinstance(data, str)
+    data = data.encode(errors="replace") if decoded else data
     if not isinstance(data, bytes):
         raise BadRequest("a robot's file", _short(robot), LOADED)
-    if os.path.isfile(name) and Path(name).read_bytes() == data:
-        return read(Path(name), overrides)
+    with contextlib.suppress(OSError):
+        if os.path.isfile(name) and _lines(Path(name).read_bytes()) == _lines(data):
+            return read(Path(name), overrides)
+    if decoded:  # whatever encoding it declares
+        data = re.sub(rb"""^(\s*<\?xml[^>]*?)\s+encoding=("[^"]*"|'[^']*')""", rb"\1", data)
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / f"robot{Path(name).suffix or '.urdf'}"
+        file = Path(folder) / f"robot{Path(name).suffix[:10] or '.urdf'}"
         file.write_bytes(data)
 
         def said(text: str) -> str:
@@ -186,6 +194,11 @@ def _read_content(robot: Any, overrides: Overrides) -> Mechanism:
     return replace(found, file=str(Path(looked_in) / f"{found.name}.urdf") if looked_in else None, sha256=None)
 
 
+def _lines(data: bytes) -> list[bytes]:
+    """The lines of a file, whatever ends them, without a mark of the encoding: text that is read has lost both."""
+    return data.removeprefix(BOM_UTF8).splitlines()
+
+
 def _short(value: object) -> object:
     """A value that is told, whole where that is short."""
     return value if len(repr(value)) <= MOST_TOLD else shorten_text(str(value), MOST_TOLD - 2)
@@ -193,7 +206,7 @@ def _short(value: object) -> object:
 
 def file_of(robot: str | os.PathLike[str]) -> Path:
     """The file that a name or a path stands for; raises ``BadRequest`` for a name of no robot."""
-    if not isinstance(robot, str | os.PathLike) or robot == "" or {"\n", "<"} & {*str(robot)}:
+    if not isinstance(robot, str | os.PathLike) or robot == "" or (isinstance(robot, str) and {"\n", "<"} & {*robot}):
         raise BadRequest("a robot's file", _short(robot), NAMED)
     path = Path(robot)
     if isinstance(robot, str) and robot.startswith(PREFIX) and not os.path.exists(robot):

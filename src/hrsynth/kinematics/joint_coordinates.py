@@ -47,7 +47,8 @@ def read_joints(at: ClosedConfiguration) -> dict[str, tuple[float, ...]]:
     if not all(joint.name in twin.coordinates for joint in counted_joints(robot)):
         twin = PinocchioModel(robot, twin.length)
         kept = tuple((link, at.pose(link)) for link in robot.links if link in at.twin.mechanism.links)
-        q, residual = solve(twin, twin.q0, LinkPoses(kept), tolerance=SOLVED, iterations=100)
+        start = twin.integrate(twin.q0, _shared(at.twin, at.q, twin))
+        q, residual = solve(twin, start, LinkPoses(kept), tolerance=SOLVED, iterations=100)
         if residual > CLOSED:
             return {}
     step = twin.difference(twin.q0, q)
@@ -55,6 +56,18 @@ def read_joints(at: ClosedConfiguration) -> dict[str, tuple[float, ...]]:
         each.name: tuple((step[list(twin.coordinates[each.name])] * _units(each, twin.length) + _offset(each)).tolist())
         for each in counted_joints(twin.mechanism)
     }
+
+
+def _shared(one: PinocchioModel, q: Array, other: PinocchioModel) -> Array:
+    """The step (nv) from another model's zero configuration at which the R and P that it has too have the values of a
+    configuration."""
+    at, step = one.difference(one.q0, q), np.zeros(other.nv)
+    for name, joint in one.mechanism.joints.items():
+        twin = other.mechanism.joints.get(name)
+        if twin is not None and joint.type == twin.type and joint.type in COUNTED[:2]:
+            zero = (_offset(joint) - _offset(twin)) / _units(joint, one.length)
+            step[other.coordinates[name][0]] = at[one.coordinates[name][0]] + zero[0]
+    return step
 
 
 def _units(joint: Joint, length: float) -> Array:
@@ -107,7 +120,9 @@ def reach_joints(
     if twin is start.twin:
         return found
     try:
-        return of_links(start.twin, found.pose)
+        at = of_links(start.twin, found.pose)
+        turns = np.round(_shared(twin, found.q, start.twin) - _shared(start.twin, at.q, start.twin), 3) / (2 * np.pi)
+        return ClosedConfiguration.of(at.twin, at.twin.integrate(at.q, 2 * np.pi * np.round(turns)))
     except LoopsNotClosed as error:
         raise PoseNotReached(robot.name, str(asked), 1.0, "", reason=f"in normal form: {error}") from None
 
@@ -116,25 +131,34 @@ def _wanted(robot: Mechanism, asked: JointPose) -> dict[str, tuple[float, ...]]:
     """The coordinates by name: those that are asked for, and those of motors that stay."""
     joints = {joint.name: joint for joint in counted_joints(robot, asked.motors)}
     sizes = {name: joint.type.freedoms for name, joint in joints.items()}
+    if asked.motors:
+        robot.require_motors()
     if not joints:
-        raise BadRequest(f"{robot.name} has no such {asked.kind}", str(asked), "another pose")
-    given = dict(asked.values)
+        raise BadRequest(f"{robot.name} has no joint with coordinates", str(asked), "another pose")
+    given, degrees = dict(asked.values), {*asked.degrees}
     if "" in given:
         flat = [x for _, part in asked.values for x in part]
         if len(flat) != sum(sizes.values()):
-            raise BadRequest(f"{robot.name}: number of {asked.kind}", len(flat), f"{sum(sizes.values())}: {[*joints]}")
+            allowed = f"{sum(sizes.values())}: {', '.join(joints)}"
+            raise BadRequest(f"{robot.name}: number of {asked.kind}", len(flat), allowed)
         ends = np.cumsum([0, *sizes.values()])
+        degrees = {name for name, i in zip(joints, ends, strict=False) if str(i) in degrees}
         given = {name: tuple(flat[i:j]) for name, i, j in zip(joints, ends, ends[1:], strict=False)}
     for name, values in given.items():
         if name not in joints:
-            raise BadRequest(f"{robot.name}: unknown among its {asked.kind}", name, [*joints] or "none is there")
+            raise BadRequest(f"{robot.name}: unknown among its {asked.kind} with coordinates", name, [*joints])
         if len(values) != sizes[name]:
-            raise BadRequest(f"{robot.name}: coordinates of {name}", "/".join(map(str, values)), str(sizes[name]))
-        lower, upper = robot.limited.get(name, (-np.inf, np.inf))
-        value, offset = values[0], float(_offset(joints[name])[0])
-        if not lower - SAME_POINT <= value - offset <= upper + SAME_POINT:
-            low, high = lower + offset, upper + offset
-            raise BadRequest(f"{robot.name}: {name} beyond its limits", value, f"{low:.6g} to {high:.6g}")
+            raise BadRequest(
+                f"{robot.name}: coordinates of {name}",
+                "/".join(map(str, values)),
+                "one number" if sizes[name] == 1 else "two numbers with / between",
+            )
+        if name in degrees and joints[name].type.slides:
+            raise BadRequest(f"{robot.name}: {name} slides", "degrees", "metres")
+        low, high = robot.filed.get(name, (-np.inf, np.inf))
+        if not low - SAME_POINT <= min(values) <= max(values) <= high + SAME_POINT:
+            told = "/".join(map(str, values))
+            raise BadRequest(f"{robot.name}: {name} beyond its limits", told, f"{low:.6g} to {high:.6g}")
     stay = {name: tuple(_offset(joint).tolist()) for name, joint in joints.items()} if asked.motors else {}
     return {**stay, **given}
 
@@ -169,23 +193,27 @@ def _lead(home: ClosedConfiguration, motion: PlatformMotion, wanted: _Wanted, as
     free = wanted.chosen(np.sort(qr(rows.T, mode="r", pivoting=True)[1][:rank]))
     begun = twin.difference(twin.q0, home.q)[list(free.places)]
     aim, stops = JointAim(free.places, begun, free.values), Stops.of(twin, home.q)
+    every = tuple(i for joint in counted_joints(twin.mechanism) for i in twin.coordinates[joint.name])
+    at_zero = twin.difference(twin.q0, home.q)[list(every)]
+    rest = JointAim(every, at_zero, at_zero)
     before, here, came = stops.margins(twin, home.q), home, 0.0
+
+    def past(at: ClosedConfiguration) -> dict[str, float]:
+        """The joints that are farther beyond their limits than they were, and by how much."""
+        margins = stops.margins(twin, at.q).items()
+        return {joint: margin for joint, margin in margins if margin < min(before[joint], 0.0) - SAME_POINT}
 
     def refuse(stopped: str) -> PoseNotReached:
         last = ",".join(f"{each:.6g}" for each in twin.difference(twin.q0, here.q)[list(free.places)])
-        reason = f"{stopped}; from its zero configuration the robot gets {100 * came:.3g} % of the way"
-        return PoseNotReached(name, str(asked), came, last, reason=reason)
+        way = f"; from its zero configuration the robot gets {100 * came:.3g} % of the way" * (came < 1)
+        return PoseNotReached(name, str(asked), came, last, reason=stopped + way)
 
     pieces = max(1, int(np.ceil(np.linalg.norm(free.values - begun) / STRIDE)))
     for number in range(1, pieces + 1):
         ahead = aim.towards(home.pose(motion.link), number / pieces)
-        there, part = track(here, motion, replace(ahead, begun=aim.towards(home.pose(motion.link), came).values))
-        over = {
-            joint: margin
-            for joint, margin in stops.margins(twin, there.q).items()
-            if margin < min(before[joint], 0.0) - SAME_POINT
-        }
-        if over:
+        step = replace(ahead, begun=aim.towards(home.pose(motion.link), came).values)
+        there, part = track(here, motion, step, home=rest)
+        if over := past(there):
             raise refuse(f"{min(over, key=lambda joint: over[joint])} is at its limit")
         here, came = there, (number - 1 + part) / pieces
         if part < 1:
@@ -195,8 +223,11 @@ def _lead(home: ClosedConfiguration, motion: PlatformMotion, wanted: _Wanted, as
     missed = JointAim(wanted.places, wanted.values, wanted.values).rows(twin, here.q)[0]
     worst = int(np.argmax(np.abs(missed)))
     if abs(missed[worst]) > AS_PRINTED:
-        raise refuse(f"with the others as they are {wanted.names[worst]} is off by {abs(missed[worst]):.3g}")
-    return nearest(here, aim, motion.at_home())
+        joint = wanted.names[worst]
+        told = "/".join(f"{x:.6g}" for x in read_joints(here)[joint])
+        raise refuse(f"with the others as they are {joint} is {told}")
+    there = nearest(here, aim, rest)
+    return here if past(there) else there
 
 
 Told = dict[str, float | tuple[float, ...]]

@@ -29,12 +29,17 @@ EASING = 30
 
 
 def track(
-    here: ClosedConfiguration, motion: PlatformMotion, goal: GuidedTask, halvings: int = HALVINGS
+    here: ClosedConfiguration,
+    motion: PlatformMotion,
+    goal: GuidedTask,
+    halvings: int = HALVINGS,
+    home: Task | None = None,
 ) -> tuple[ClosedConfiguration, float]:
     """Lead a configuration to a goal by small steps: where it comes to, and the part of the way that it came (1: all of
-    it). A goal of more parts than there are freedoms is met where it is missed by no more than printed digits."""
+    it). A goal of more parts than there are freedoms is met where it is missed by no more than printed digits. What the
+    goal leaves free stays near ``home`` (default: the platform's pose at the zero configuration)."""
     X = here.pose(motion.link)
-    home = motion.at_home()
+    home = home or motion.at_home()
     error, rows = goal.rows(here.twin, here.q)
     longest = 1 / max(1, int(np.ceil(np.linalg.norm(error) / STRIDE)))
     if are_dependent(here, rows):
@@ -98,7 +103,7 @@ def _ease_towards(
     return here
 
 
-def _step_to(here: ClosedConfiguration, goal: GuidedTask, home: Goal, last: bool = True) -> ClosedConfiguration | None:
+def _step_to(here: ClosedConfiguration, goal: GuidedTask, home: Task, last: bool = True) -> ClosedConfiguration | None:
     """The configuration at a goal nearby, moved towards ``home`` where parts are free; None where it jumps or lies
     beyond a fold, in another working mode, or on one and is not the ``last``."""
     twin = here.twin
@@ -140,15 +145,16 @@ def _correct_step(here: ClosedConfiguration, step: Array, goal: GuidedTask | Non
     return there if follows(here, step, there) or nears(here, step, there) else None
 
 
-def nearest(here: ClosedConfiguration, goal: GuidedTask, home: Goal) -> ClosedConfiguration:
-    """The configuration at ``goal`` whose platform pose is nearest to ``home``: the projected gradient vanishes, the
-    loops are closed as well as floating point can; ``here`` itself where the goal is met but for its printed digits."""
+def nearest(here: ClosedConfiguration, goal: GuidedTask, home: Task) -> ClosedConfiguration:
+    """The configuration at ``goal`` nearest to ``home`` (a pose of the platform, other values): the projected gradient
+    vanishes, the loops are closed as well as floating point can; ``here`` itself where the goal is met but for its
+    printed digits."""
     if np.linalg.norm(goal.rows(here.twin, here.q)[0]) > SOLVED:
         return here
     return polish(_drawn_home(here, goal, home, 100), goal)
 
 
-def _drawn_home(here: ClosedConfiguration, goal: GuidedTask, home: Goal, iterations: int) -> ClosedConfiguration:
+def _drawn_home(here: ClosedConfiguration, goal: GuidedTask, home: Task, iterations: int) -> ClosedConfiguration:
     """Minimise |home's error| with the goal held."""
     for _ in range(iterations):
         size = np.linalg.norm(home.rows(here.twin, here.q)[0]) + SOLVED

@@ -237,7 +237,7 @@ def likely_motors(base: str, joints: Sequence[Any]) -> tuple[list[str], str]:
 
 def _counted(bound: float, joint: Joint) -> float:
     """A limit from the file's zero, to the digits that adding and taking away leaves."""
-    return bound if joint.offset is None or joint.offset.ndim > 1 else float(f"{bound + joint.offset[0]:.15g}")
+    return bound if joint.offset is None or joint.offset.size > 1 else float(f"{bound + joint.offset[0]:.15g}")
 
 
 def fresh_name(name: str, *taken: Container[str]) -> str:

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Protocol, TypedDict, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..budgets import FARTHEST_POSE, LARGEST_GRID
+from ..budgets import FARTHEST_JOINT, FARTHEST_POSE, LARGEST_GRID
 from ..errors import BadRequest
 from ..geometry.vectors import Array, rotation_from_rpy
 from ..options import plain_number
@@ -130,28 +130,32 @@ class JointPose:
     motors: bool
     values: tuple[tuple[str, tuple[float, ...]], ...]
     """By name; without names (empty) in the order of the file."""
+    degrees: tuple[str, ...] = ()
+    """Names, or numbers in the order of the file, of those that were given in degrees."""
 
     @classmethod
     def of(cls, kind: str, given: Any) -> JointPose:
         """Those of ``joints`` or ``motors``, given as a text, as a dict by names, or in the order of the file; raises
         ``BadRequest``."""
-        named = isinstance(given, Mapping)
-        try:
-            if isinstance(given, str):
-                parts = [part.rpartition("=") for part in given.split(",")]
-                named = all(equals for _, equals, _ in parts)
-                if not named and any(equals for _, equals, _ in parts):
-                    raise ValueError
-                pairs = [(name.strip(), _coordinates(value)) for name, _, value in parts]
-            else:
-                found = given.items() if named else (("", value) for value in given)
-                pairs = [(str(name), _coordinates(value)) for name, value in found]
-        except (TypeError, ValueError):
-            raise BadRequest(f"{kind} of a pose", given, JOINT_POSES) from None
-        names = [name for name, _ in pairs if named]
-        if not pairs or len(set(names)) < len(names) or not np.isfinite([x for _, part in pairs for x in part]).all():
-            raise BadRequest(f"{kind} of a pose: finite values, each name once", given, JOINT_POSES)
-        return cls(kind == "motors", tuple(pairs))
+        pairs: list[tuple[str, Any]] = []
+        if isinstance(given, str):
+            parts = [part.rpartition("=") for part in given.split(",")]
+            pairs = [(name.strip(), value.strip()) for name, _, value in parts]
+        elif isinstance(given, Mapping):
+            pairs = [(str(name), value) for name, value in given.items()]
+        elif isinstance(given, Iterable):
+            pairs = [("", value) for value in given]
+        names = {name for name, _ in pairs}
+        if not pairs or ("" in names and len(names) > 1):
+            raise BadRequest(f"{kind} of a pose: all by name, or all in the order of the file", given, JOINT_POSES)
+        if "" not in names and len(names) < len(pairs):
+            raise BadRequest(f"{kind} of a pose: a name is given twice", given, "each once")
+        read = [(name, *_coordinates(kind, value)) for name, value in pairs]
+        return cls(
+            kind == "motors",
+            tuple((name, values) for name, values, _ in read),
+            tuple(name or str(number) for number, (name, _, degrees) in enumerate(read) if degrees),
+        )
 
     @property
     def kind(self) -> str:
@@ -163,12 +167,25 @@ class JointPose:
         return f"{self.kind}:{','.join(parts)}"
 
 
-def _coordinates(given: Any) -> tuple[float, ...]:
-    """The coordinates of one joint: numbers in metres or radians, or a text with / between, degrees with ``deg``."""
-    if not isinstance(given, str):
-        return tuple(map(float, np.atleast_1d(given)))
-    typed = [(part.strip(), part.strip().removesuffix("deg")) for part in given.split("/")]
-    return tuple(float(np.radians(plain_number(x))) if x != part else plain_number(x) for part, x in typed)
+def _coordinates(kind: str, given: Any) -> tuple[tuple[float, ...], bool]:
+    """The coordinates of one joint, and whether they are in degrees: numbers in metres or radians, or a text with /
+    between, degrees with ``deg``."""
+    try:
+        if isinstance(given, str):
+            typed = [part.strip() for part in given.split("/")]
+            digits = [part.removesuffix("deg") for part in typed]
+            numbers = [
+                float(np.radians(plain_number(x))) if x != part else plain_number(x)
+                for part, x in zip(typed, digits, strict=True)
+            ]
+        else:
+            typed, digits, numbers = [], [], np.atleast_1d(given).tolist()
+        if all(isinstance(x, int | float) and not isinstance(x, bool) and abs(x) < FARTHEST_JOINT for x in numbers):
+            return tuple(map(float, numbers)), typed != digits
+    except (TypeError, ValueError, OverflowError):
+        pass
+    unit = f"metres or radians below {FARTHEST_JOINT:g}, or of degrees with deg"
+    raise BadRequest(f"{kind} of a pose: not a number of {unit}", given, JOINT_POSES)
 
 
 JOINT_POSES = "joints:NAME=VALUE,… or motors:VALUE,VALUE,… in the order of the file (m, rad, or degrees with deg)"
@@ -251,14 +268,18 @@ def asked_pose(given: PoseLike) -> AskedPose:
     """The pose that is given, by its parts, as ``mode:3`` or by coordinates of joints; raises ``BadRequest``."""
     if isinstance(given, ModeNumber | JointPose):
         return given
-    if isinstance(given, Mapping) and len(given) == 1 and (kind := next(iter(given))) in ("joints", "motors"):
-        return JointPose.of(kind, given[kind])
+    if isinstance(given, Mapping) and (kinds := [name for name in ("joints", "motors") if name in given]):
+        if len(given) > 1:
+            raise BadRequest(f"a pose by {kinds[0]} and other parts", ", ".join(map(str, given)), "one of them")
+        return JointPose.of(kinds[0], given[kinds[0]])
     if not isinstance(given, str):
         return as_pose(given)
     name, colon, number = given.strip().partition(":")
     if colon and name in ("joints", "motors"):
         return JointPose.of(name, number)
     if not colon or name != "mode":
+        if given.strip().casefold().startswith(("joint", "motor")):
+            raise BadRequest("a pose by joints or motors", given, JOINT_POSES)
         return Pose.parse(given)
     if not (number.isascii() and number.isdecimal()) or int(number) < 1:
         raise BadRequest("number of a mode", given, "mode:1, mode:2, … as modes lists them")
