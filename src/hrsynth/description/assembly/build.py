@@ -209,5 +209,5 @@ def _away_from_singular(mechanism: Mechanism) -> Mechanism:
         if freedoms[1] < freedoms[0]
         else f"nearly singular (weakest singular value {here.weakest:.1e}, {after.weakest:.1e} nearby)"
     )
-    note = Note("solved", f"the zero pose is {why}: moved to {moves(assembly, there)}")
+    note = Note("solved", f"the zero pose is {why}: moved by {moves(assembly, there)}")
     return replace(with_zero_at(mechanism, assembly, there), notes=(*mechanism.notes, note))

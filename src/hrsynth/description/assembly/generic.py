@@ -89,7 +89,7 @@ def with_generic_zero(mechanism: Mechanism) -> Mechanism:
     kind = "a Type 2 singularity of all legs together" if lost else "special"
     note = Note(
         "solved",
-        f"the zero pose is {kind} ({here.beside(generic, labels)}): moved to "
+        f"the zero pose is {kind} ({here.beside(generic, labels)}): moved by "
         f"{moves(assembly, there)} (--keyframe {STAY} to stay)",
     )
     return replace(with_zero_at(mechanism, assembly, there), notes=(*mechanism.notes, note))
