@@ -220,7 +220,7 @@ def test_derive_text_has_the_hidden_robot_and_the_verdict(run):
     assert answer.err == ""
 
 
-@pytest.mark.some(1)
+@pytest.mark.slow
 def test_pairs_of_the_same_letters_are_told_apart_by_their_links(run):
     one, other = (run("derive", "quattro", "--observe", legs).out for legs in ("1,2", "1,4"))
     hidden = [line for line in one.splitlines() if line.startswith("hidden robot")]

@@ -86,7 +86,9 @@ def wrong(command: str, record: dict) -> list[str]:
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize("command", commands())
+@pytest.mark.parametrize(
+    "command", [pytest.param(each, marks=[pytest.mark.slow] * each.startswith("catalog")) for each in commands()]
+)
 def test_every_answer_is_what_its_schema_says(here: Path, capsys, command: str):
     if command == "verify":
         assert execute(["modes", "3rrr_m1", "--certificate", "c.json"]) == 0

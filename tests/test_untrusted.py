@@ -549,7 +549,10 @@ def certificates() -> Iterator[tuple[str, dict[str, Any]]]:
     )
 
 
-@pytest.mark.parametrize(("what", "record"), list(certificates()), ids=[name for name, _ in certificates()])
+@pytest.mark.parametrize(
+    ("what", "record"),
+    [pytest.param(*each, id=each[0], marks=[pytest.mark.slow] * (each[0] == "12 angles")) for each in certificates()],
+)
 def test_a_small_certificate_is_checked_soon(what: str, record: dict[str, Any]):
     checker = verify_ranks if record["claim"] == "ranks" else verify_certificate
     record = {"format": "hrsynth-certificate-1", "real": 0, "complex": 0, **record}

@@ -61,6 +61,7 @@ def test_show_takes_a_name_as_the_search_does(capsys, text: str, word: str):
     assert (answer["note"] is None) == text.startswith("'")
 
 
+@pytest.mark.slow
 def test_what_cannot_be_asked_is_refused(capsys):
     for asked in (["show", "nonsense"], ["list", "--modes", "-1"], ["list", "--dof", "-1"]):
         assert execute(["catalog", *asked]) == 2

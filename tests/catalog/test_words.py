@@ -64,6 +64,7 @@ def test_groups_are_as_large_as_their_grammar_says():
     assert min(count for name, count in counts.items() if name != "schoenflies") >= 900, counts
 
 
+@pytest.mark.slow
 @settings(max_examples=200)
 @given(ANY, st.randoms(use_true_random=False))
 def test_order_of_legs_and_choice_of_names_do_not_count(text, rng):

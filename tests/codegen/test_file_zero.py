@@ -207,7 +207,7 @@ def judged(case: Case, values: Mapping[str, float], position: Array, R: Array) -
             assert values[joint.name] == pytest.approx(ratio * values["j1"] + offset, abs=1e-10)
 
 
-@pytest.mark.some(4)
+@pytest.mark.some(3)
 @pytest.mark.parametrize("name", CASES)
 def test_motors_and_passive_joints_count_from_the_files_zero(name: str, tmp_path: Path):
     case = CASES[name]

@@ -130,6 +130,7 @@ def test_virtual_actuators_are_marked_and_motors_are_not_in_the_hidden_robot(nam
         assert all(shape.role == role for shape in machine.shapes if shape.joint in driven)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("name", ROBOTS)
 def test_every_observed_leg_has_its_arrow_along_what_is_observed(name: str):
     found = seen(name)

@@ -129,6 +129,7 @@ def test_the_number_of_modes_changes_at_the_curve_alone(drawn: HeldLegSection):
         assert np.min(gap.max(axis=1)) <= cell
 
 
+@pytest.mark.slow
 def test_the_section_holds_all_modes_of_the_goal():
     found = classic()
     made = found.section

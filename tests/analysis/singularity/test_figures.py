@@ -54,7 +54,7 @@ def examples(*case: str) -> tuple[Example, ...]:
     return found
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("case", CASES)
 def test_the_rank_is_lost_there_and_full_a_centimetre_away(case: tuple[str, ...]) -> None:
     for each in examples(*case):

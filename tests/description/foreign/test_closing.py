@@ -122,7 +122,7 @@ def moved_by(robot: Mechanism) -> float:
     )
 
 
-@pytest.mark.parametrize("legs", [1, 2])
+@pytest.mark.parametrize("legs", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_singular_zero_pose_is_left_by_a_small_step(legs: int, tmp_path: Path):
     """Of all legs at once; one that is asked for stays."""
     path = legged(tmp_path, legs)

@@ -289,7 +289,9 @@ LARGE = {
 
 
 @pytest.mark.some(3, 8)
-@pytest.mark.parametrize("name", LARGE)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name == "a factorial" else name for name in LARGE]
+)
 def test_large_values_and_other_files_are_refused_in_time(name: str, tmp_path: Path):
     folder = tmp_path / "robot"
     folder.mkdir()
