@@ -95,13 +95,14 @@ def test_the_python_example_runs_and_prints_what_it_says():
     assert output.getvalue().splitlines() == said
 
 
-def test_the_program_of_a_page_runs_and_prints_what_it_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+@pytest.mark.parametrize("page", ["pinocchio.md", "joints.md"])
+def test_the_program_of_a_page_runs_and_prints_what_it_says(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     pytest.importorskip("mujoco")
     monkeypatch.chdir(tmp_path)
-    code = "\n".join(re.findall(r"```python\n(.*?)```", (PAGES / "pinocchio.md").read_text("utf-8"), re.DOTALL))
+    code = "\n".join(re.findall(r"```python\n(.*?)```", (PAGES / page).read_text("utf-8"), re.DOTALL))
     said = re.findall(r"# → (.*)", code)
     with contextlib.redirect_stdout(io.StringIO()) as output:
-        exec(compile(code, "pinocchio.md", "exec"), {})
+        exec(compile(code, page, "exec"), {})
     assert all(itertools.starmap(_alike, zip(said, output.getvalue().splitlines(), strict=True)))
 
 
