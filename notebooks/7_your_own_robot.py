@@ -114,8 +114,9 @@ FIVE_BAR = """<mujoco model="five_bar">
 """
 foreign = folder / "five_bar.xml"
 foreign.write_text(FIVE_BAR)
+other = hrsynth.load(foreign)
 try:
-    other = hrsynth.load(foreign)
+    hrsynth.derive(other)
 except HrsynthError as error:
     print("\n".join(error.lines()).replace(str(folder), "…"))
     other = hrsynth.load(foreign, platform="rod_1")

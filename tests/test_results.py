@@ -17,6 +17,7 @@ import pytest
 
 import hrsynth
 from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.mechanism.model import PlatformChoice
 from hrsynth.results import Result
 
 START, GOAL = "x=0,y=0,z=-0.75,phi=0", "x=-0.2,y=0,z=-0.56,phi=0"
@@ -29,6 +30,9 @@ ASKED = {
     "verdict": lambda: hrsynth.derive(hrsynth.load("quattro"), LEGS).verdict,
     "legs": lambda: hrsynth.legs(hrsynth.load("3rpr_m1")),
     "check": lambda: hrsynth.check(hrsynth.load("quattro"), LEGS, at=[START], grid="x=-0.1:0.1:3,y=0,z=-0.7"),
+    "check loops": lambda: hrsynth.check(
+        hrsynth.load("quattro").changed(choice=PlatformChoice("open", "several could be"))
+    ),
     "singular": lambda: hrsynth.singular(hrsynth.load("quattro"), LEGS, points=50),
     "advise": lambda: hrsynth.advise(hrsynth.load("quattro"), ["1"]),
     "accuracy": lambda: hrsynth.accuracy(hrsynth.load("quattro"), LEGS, cone="0.1deg", plane="z=-0.7", steps=5),

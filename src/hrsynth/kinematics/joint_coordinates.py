@@ -234,13 +234,16 @@ Told = dict[str, float | tuple[float, ...]]
 """Coordinates by joint: a number, or one for each axis."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class FileCoordinates(Record, all_recorded=True):
     """Coordinates of the file's joints at a configuration (m, rad), counted from its zero: of the driven ones
     (``motors``) and of the others."""
 
     motors: Told
     joints: Told
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {len(self.motors)} motors, {len(self.joints)} other joints>"
 
     @classmethod
     def of(cls, at: ClosedConfiguration) -> FileCoordinates:

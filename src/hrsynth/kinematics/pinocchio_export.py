@@ -59,7 +59,7 @@ def to_pinocchio(robot: Mechanism | str | Path) -> PinocchioExport:
 
     >>> model, constraints, q0, *names = hrsynth.to_pinocchio("3rrr_m1")
     >>> model.nq, len(constraints)
-    (9, 3)
+    (9, 2)
     """
     mechanism = load(robot)
     return _Export(mechanism, spanning(mechanism)).result()
