@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -45,7 +46,7 @@ def read_joints(at: ClosedConfiguration) -> dict[str, tuple[float, ...]]:
     twin, q = at.twin, at.q
     robot = twin.mechanism.written or twin.mechanism
     if not all(joint.name in twin.coordinates for joint in counted_joints(robot)):
-        twin = PinocchioModel(robot, twin.length)
+        twin = _model(robot, twin.length)
         kept = tuple((link, at.pose(link)) for link in robot.links if link in at.twin.mechanism.links)
         start = twin.integrate(twin.q0, _shared(at.twin, at.q, twin))
         q, residual = solve(twin, start, LinkPoses(kept), tolerance=SOLVED, iterations=100)
@@ -56,6 +57,12 @@ def read_joints(at: ClosedConfiguration) -> dict[str, tuple[float, ...]]:
         each.name: tuple((step[list(twin.coordinates[each.name])] * _units(each, twin.length) + _offset(each)).tolist())
         for each in counted_joints(twin.mechanism)
     }
+
+
+@lru_cache(maxsize=8)
+def _model(robot: Mechanism, length: float) -> PinocchioModel:
+    """The model of a robot as its file has it: made once for many configurations."""
+    return PinocchioModel(robot, length)
 
 
 def _shared(one: PinocchioModel, q: Array, other: PinocchioModel) -> Array:
@@ -114,7 +121,7 @@ def reach_joints(
     wanted = _wanted(robot, asked)
     twin, home = start.twin, start
     if not all(joint.name in twin.coordinates for joint in counted_joints(robot)):
-        twin = PinocchioModel(robot, twin.length)
+        twin = _model(robot, twin.length)
         home = ClosedConfiguration.of(twin, twin.q0)
     found = _lead(home, motion, _Wanted.of(twin, wanted), asked)
     if twin is start.twin:
