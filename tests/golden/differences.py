@@ -39,11 +39,25 @@ def inlined(schema: Json, parts: Json, inside: tuple[str, ...] = ()) -> Json:
     }
 
 
-def renamed(value: Json, names: dict[str, str]) -> Json:
-    """The same with other names of fields: those that were changed on purpose."""
+def renamed(value: Json, names: dict[str, str], words: dict[str, str]) -> Json:
+    """The same with other names of fields, and other words in texts: those that were changed on purpose."""
     if isinstance(value, dict):
-        return {names.get(key, key): renamed(part, names) for key, part in value.items()}
-    return [renamed(part, names) for part in value] if isinstance(value, list) else value
+        return {names.get(key, key): renamed(part, names, words) for key, part in value.items()}
+    if isinstance(value, str):
+        for old, new in words.items():
+            value = value.replace(old, new)
+    return [renamed(part, names, words) for part in value] if isinstance(value, list) else value
+
+
+def without(value: Json, names: list[str], lines: list[str]) -> Json:
+    """The same without fields of these names, and without lines of text that begin so."""
+    if isinstance(value, dict):
+        return {key: without(part, names, lines) for key, part in value.items() if key not in names}
+    if isinstance(value, list):
+        return [without(part, names, lines) for part in value if part not in names]
+    if isinstance(value, str) and "\n" in value:
+        return "\n".join(line for line in value.splitlines() if not line.lstrip().startswith(tuple(lines)))
+    return value
 
 
 def differences(old: Json, new: Json, at: str = "") -> Iterator[str]:

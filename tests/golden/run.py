@@ -1,8 +1,8 @@
 """``python -m golden.run make`` writes what every command answers, ``… compare`` tells what has changed since.
 
-From ``tests/``. ``--only TEXT``: cases whose names hold it; ``--workers N``. Names of JSON fields that were changed on
-purpose stand in ``renamed.toml``. The exit status of ``compare`` is 1 where anything differs. Files of others are asked
-where they are; cases that only one side has are told.
+From ``tests/``. ``--only TEXT``: cases whose names hold it; ``--workers N``. What was changed on purpose (names of JSON
+fields, words, what was added) stands in ``renamed.toml``. The exit status of ``compare`` is 1 where anything differs.
+Files of others are asked where they are; cases that only one side has are told.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from golden.answers import Case, asked, cases
-from golden.differences import GREY, differences, inlined, of_pictures, renamed
+from golden.differences import GREY, differences, inlined, of_pictures, renamed, without
 
 KEPT = Path(__file__).parent / "answers.jsonl.gz"
 NAMES = Path(__file__).parent / "renamed.toml"
@@ -34,9 +34,10 @@ def answers(chosen: Iterable[Case], workers: int) -> Iterator[tuple[str, Any]]:
             yield found
 
 
-def changes(old: Any, new: Any, names: dict[str, str]) -> list[str]:
-    """What differs in two answers to one case."""
-    old = renamed(old, names)
+def changes(old: Any, new: Any, meant: dict[str, Any]) -> list[str]:
+    """What differs in two answers to one case, but for what was ``meant``."""
+    added = meant["added"]["fields"], meant["added"]["lines"]
+    old, new = without(renamed(old, meant["fields"], meant["words"]), *added), without(new, *added)
     for each in (old, new):
         if isinstance(each.get("json"), dict) and "$defs" in each["json"]:
             each["json"] = inlined(each["json"], each["json"]["$defs"])
@@ -64,11 +65,11 @@ def main() -> int:
         return 0
     with gzip.open(KEPT, "rt") as lines:
         known = dict(map(json.loads, lines))
-    names = tomllib.loads(NAMES.read_text())["fields"]
+    meant = tomllib.loads(NAMES.read_text())
     new = [case.key for case in chosen if case.key not in known]
     differ = 0
     for key, found in answers((case for case in chosen if case.key in known), given.workers):
-        if told := changes(known[key], json.loads(json.dumps(found)), names):
+        if told := changes(known[key], json.loads(json.dumps(found)), meant):
             differ += 1
             print(f"{key}\n  " + "\n  ".join(told[:5]) + (f"\n  … {len(told) - 5} more" if len(told) > 5 else ""))
     print(f"{len(chosen) - len(new)} answers compared, {differ} differ; {len(new)} new")
