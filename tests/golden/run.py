@@ -58,13 +58,16 @@ def main() -> int:
     parser.add_argument("--workers", type=int, default=2)
     given = parser.parse_args()
     chosen = [case for case in cases() if given.only in case.key]
+    known: dict[str, Any] = {}
+    if KEPT.exists():
+        with gzip.open(KEPT, "rt") as lines:
+            known = dict(map(json.loads, lines))
     if given.what == "make":
-        kept = [json.dumps([key, found], sort_keys=True) for key, found in answers(chosen, given.workers)]
-        KEPT.write_bytes(gzip.compress("".join(line + "\n" for line in kept).encode(), mtime=0))
-        print(f"{len(kept)} answers, {KEPT.stat().st_size / 1e3:.0f} kB")
+        known |= answers(chosen, given.workers)
+        kept = (json.dumps(each, sort_keys=True) + "\n" for each in known.items())
+        KEPT.write_bytes(gzip.compress("".join(kept).encode(), mtime=0))
+        print(f"{len(known)} answers, {KEPT.stat().st_size / 1e3:.0f} kB")
         return 0
-    with gzip.open(KEPT, "rt") as lines:
-        known = dict(map(json.loads, lines))
     meant = tomllib.loads(NAMES.read_text())
     new = [case.key for case in chosen if case.key not in known]
     differ = 0
