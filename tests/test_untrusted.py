@@ -91,7 +91,7 @@ def archive(*names: str, size: int | None = None) -> bytes:
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w") as file:
         for name in names:
-            file.writestr(name, b"x")
+            file.writestr(zipfile.ZipInfo(name), b"x")
     data = bytearray(out.getvalue())
     at = data.find(b"PK\x01\x02")
     while size is not None and at >= 0:
