@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import combinations
 from math import comb
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 from ..kinematics.sampling import Samples
 from ..mechanism.observation import labels_of
@@ -31,9 +31,6 @@ from .observed import (
 )
 from .question import analysis
 from .verdict import Verdict, verdict_of
-
-if TYPE_CHECKING:
-    pass
 
 LARGEST_COMPLETE = 10
 """Number of legs up to which all sets are listed; beyond, sets of up to three, the smallest and the whole."""
