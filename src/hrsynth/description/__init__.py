@@ -138,7 +138,7 @@ def load(
     else:
         found = _read_content(robot, overrides)
     for note in found.notes:
-        if note.kind == "guess" and ("the base is" in note.text or "it is the base" in note.text):
+        if note.base:
             warn_caller(shorten_text(f"{found.name}: {note.text}", MOST_WARNED), GuessedBase)
     if found.choice is not None and found.choice.chosen == "guess":
         text = f"{found.name}: the platform is link {found.platform!r}, {found.choice}"

@@ -160,9 +160,9 @@ class JointGraph:
     unit: float = 1.0
     """Metres in the file's unit of length, in which postures stay."""
 
-    def note(self, kind: str, text: str) -> None:
-        """Record what the file does not say."""
-        self.notes.append(Note(kind, text))
+    def note(self, kind: str, text: str, *, base: bool = False) -> None:
+        """Record what the file does not say; of the ``base``, which link is taken for it."""
+        self.notes.append(Note(kind, text, base))
 
     def note_assumed(self) -> None:
         """Record the guesses about many joints, one note a kind."""

@@ -202,6 +202,8 @@ class Note:
 
     kind: str
     text: str
+    base: bool = False
+    """Whether it tells which link is taken for the base."""
 
     def __str__(self) -> str:
         return f"{self.kind}: {self.text}"

@@ -35,6 +35,7 @@ def base(graph: JointGraph) -> str:
         graph.note(
             "guess",
             f"the base is link {free[0]!r}, the first of {len(free)} that no joint carries (--base LINK to change it)",
+            base=True,
         )
     return free[0]
 
@@ -68,7 +69,7 @@ def standing(graph: JointGraph, base: str, wanted: str | None, platform: str | N
             )
         else:
             break
-        graph.note("guess", f"{trunk!r} {how}")
+        graph.note("guess", f"{trunk!r} {how}", base=True)
         del graph.joints[bearer.name], graph.links[base]
         base = trunk
     return base
@@ -110,6 +111,7 @@ def _without_float(graph: JointGraph, base: str, named: set[str | None]) -> str:
         "guess",
         f"{link!r} floats on the joints {names}, which place it: it is the base, and what it floats in "
         f"is left out (--base {base} to keep it)",
+        base=True,
     )
     for each in chain:
         del graph.joints[each.name], graph.links[each.links[0]]
