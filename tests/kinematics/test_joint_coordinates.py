@@ -87,6 +87,24 @@ def test_coordinates_count_as_the_file_counts() -> None:
     assert np.abs(back.pose(link) - zero.pose(link)).max() < 1e-8
 
 
+def test_the_file_counts_on_where_its_joints_were_joined_and_its_zero_has_moved() -> None:
+    robot = hrsynth.load("delta")
+    for seed in range(2):
+        robot = split(robot, np.random.default_rng(seed), ("spherical",))
+    moved = hrsynth.observe(robot, at="motors:0.1,0.2,0.3")
+    told = FileCoordinates.of(moved.everything.start)
+    assert {*told.joints} == {joint.name for joint in counted_joints(robot) if not joint.actuated} != set()
+    assert told.motors == pytest.approx({"shoulder_1": 0.1, "shoulder_2": 0.2, "shoulder_3": 0.3}, abs=1e-9)
+    same = asked_at(moved, [JointPose(False, tuple((name, (value,)) for name, value in told.joints.items()))])
+    assert isinstance(same[0], ClosedConfiguration)
+    (back,) = asked_at(moved, [asked_pose("motors:0,0,0")])
+    assert isinstance(back, ClosedConfiguration)
+    zero, link = ObservedRobot.of(robot).everything.start, moved.motion.link
+    assert np.abs(back.pose(link) - zero.pose(link)).max() < 1e-8
+    found = hrsynth.check(moved, at="motors:shoulder_2=0").postures[0].coordinates
+    assert found.motors == pytest.approx({"shoulder_1": 0.1, "shoulder_2": 0.0, "shoulder_3": 0.3}, abs=1e-9)
+
+
 @pytest.mark.parametrize(
     "given",
     [

@@ -125,7 +125,7 @@ def asked_at(
         if not isinstance(each, ModeNumber):
             try:
                 if isinstance(each, JointPose):
-                    found[each] = reach_joints(setting.robot, everything.start, motion, each)
+                    found[each] = reach_joints(everything.start, motion, each)
                 else:
                     found[each] = reach(everything.start, everything.question, each, motion)
             except PoseNotReached as error:

@@ -9,8 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import BadRequest, LoopsNotClosed, PoseNotReached
 from ..geometry.ranks import range_basis
@@ -37,22 +39,27 @@ def counted_joints(robot: Mechanism, motors: bool = False) -> list[Joint]:
     return [each for each in robot.joints.values() if each.type in COUNTED and (each.actuated or not motors)]
 
 
-def read_joints(at: ClosedConfiguration) -> dict[str, tuple[float, ...]]:
-    """The coordinates of the joints of a robot, as its file has them, at a configuration of it or of its normal form.
+def as_written(at: ClosedConfiguration) -> ClosedConfiguration | None:
+    """A configuration in the joints that the robot's file has; None where the normal form has made one joint of
+    several, and the poses of the links that are left do not fit the file's joints."""
+    robot = at.twin.mechanism.written or at.twin.mechanism
+    if all(joint.name in at.twin.coordinates for joint in counted_joints(robot)):
+        return at
+    twin = _model(robot, at.twin.length)
+    kept = tuple((link, at.pose(link)) for link in robot.links if link in at.twin.mechanism.links)
+    start = twin.integrate(twin.q0, _shared(at.twin, at.q, twin))
+    q, residual = solve(twin, start, LinkPoses(kept), tolerance=SOLVED, iterations=100)
+    return ClosedConfiguration.of(twin, q) if residual <= CLOSED else None
 
-    Where the normal form has made one joint of several, theirs are found from the poses of the links that are left;
-    none are told where these do not fit.
-    """
-    twin, q = at.twin, at.q
-    robot = twin.mechanism.written or twin.mechanism
-    if not all(joint.name in twin.coordinates for joint in counted_joints(robot)):
-        twin = _model(robot, twin.length)
-        kept = tuple((link, at.pose(link)) for link in robot.links if link in at.twin.mechanism.links)
-        start = twin.integrate(twin.q0, _shared(at.twin, at.q, twin))
-        q, residual = solve(twin, start, LinkPoses(kept), tolerance=SOLVED, iterations=100)
-        if residual > CLOSED:
-            return {}
-    step = twin.difference(twin.q0, q)
+
+def read_joints(at: ClosedConfiguration) -> dict[str, tuple[float, ...]]:
+    """The coordinates of the joints of a robot, as its file has them, at a configuration of it or of its normal form;
+    none are told where the file's joints do not fit."""
+    own = as_written(at)
+    if own is None:
+        return {}
+    twin = own.twin
+    step = twin.difference(twin.q0, own.q)
     return {
         each.name: tuple((step[list(twin.coordinates[each.name])] * _units(each, twin.length) + _offset(each)).tolist())
         for each in counted_joints(twin.mechanism)
@@ -94,48 +101,44 @@ class JointAim(Value):
     """Coordinates of a twin (by their ``places`` in its velocities) that are wanted, from ``begun`` where a way to them
     starts; characteristic lengths, radians."""
 
-    places: tuple[int, ...]
+    places: NDArray[np.intp]
     begun: Array
     values: Array
 
     def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
         """Error (reached − wanted) and its Jacobian."""
-        places = list(self.places)
-        return twin.difference(twin.q0, q)[places] - self.values, np.eye(twin.nv)[places]
+        return twin.difference(twin.q0, q)[self.places] - self.values, np.eye(twin.nv)[self.places]
 
     def towards(self, X: Array, fraction: float) -> JointAim:
         """What lies ``fraction`` of the way; the platform's pose X (4, 4) says nothing here."""
         return self if fraction == 1 else replace(self, values=self.begun + fraction * (self.values - self.begun))
 
 
-def reach_joints(
-    robot: Mechanism, start: ClosedConfiguration, motion: PlatformMotion, asked: JointPose
-) -> ClosedConfiguration:
-    """The configuration with these coordinates that small steps lead to from ``start`` on its branch, all joints within
-    their limits.
+def reach_joints(start: ClosedConfiguration, motion: PlatformMotion, asked: JointPose) -> ClosedConfiguration:
+    """The configuration with these coordinates that small steps lead to from the zero configuration ``start`` on its
+    branch, all joints within their limits; coordinates that depend on others must agree with them.
 
-    ``start`` is the zero configuration of ``robot`` in its own joints or in normal form; coordinates that depend on
-    others must agree with them. Raises ``BadRequest`` for unknown joints, their number and values beyond limits,
-    ``PoseNotReached`` where the way ends before, saying which joint stops it.
+    Raises ``BadRequest`` for unknown joints, their number and values beyond limits, ``PoseNotReached`` where the way
+    ends before, saying which joint stops it.
     """
-    wanted = _wanted(robot, asked)
-    twin, home = start.twin, start
-    if not all(joint.name in twin.coordinates for joint in counted_joints(robot)):
-        twin = _model(robot, twin.length)
-        home = ClosedConfiguration.of(twin, twin.q0)
-    found = _lead(home, motion, _Wanted.of(twin, wanted), asked)
-    if twin is start.twin:
+    home, name = as_written(start), start.twin.mechanism.name
+    if home is None:
+        raise PoseNotReached(name, str(asked), 0.0, "", reason="the file's joints do not fit its normal form")
+    found = _lead(home, motion, _wanted(home, asked), asked)
+    if home is start:
         return found
     try:
         at = of_links(start.twin, found.pose)
-        turns = np.round(_shared(twin, found.q, start.twin) - _shared(start.twin, at.q, start.twin), 3) / (2 * np.pi)
-        return ClosedConfiguration.of(at.twin, at.twin.integrate(at.q, 2 * np.pi * np.round(turns)))
+        turns = _shared(home.twin, found.q, start.twin) - _shared(start.twin, at.q, start.twin)
+        whole = 2 * np.pi * np.round(np.round(turns, 3) / (2 * np.pi))
+        return ClosedConfiguration.of(at.twin, at.twin.integrate(at.q, whole))
     except LoopsNotClosed as error:
-        raise PoseNotReached(robot.name, str(asked), 1.0, "", reason=f"in normal form: {error}") from None
+        raise PoseNotReached(name, str(asked), 1.0, "", reason=f"in normal form: {error}") from None
 
 
-def _wanted(robot: Mechanism, asked: JointPose) -> dict[str, tuple[float, ...]]:
-    """The coordinates by name: those that are asked for, and those of motors that stay."""
+def _wanted(home: ClosedConfiguration, asked: JointPose) -> dict[str, tuple[float, ...]]:
+    """The coordinates by name: those that are asked for, and those of motors that stay as they are."""
+    robot = home.twin.mechanism
     joints = {joint.name: joint for joint in counted_joints(robot, asked.motors)}
     sizes = {name: joint.type.freedoms for name, joint in joints.items()}
     if asked.motors:
@@ -166,43 +169,28 @@ def _wanted(robot: Mechanism, asked: JointPose) -> dict[str, tuple[float, ...]]:
         if not low - SAME_POINT <= min(values) <= max(values) <= high + SAME_POINT:
             told = "/".join(map(str, values))
             raise BadRequest(f"{robot.name}: {name} beyond its limits", told, f"{low:.6g} to {high:.6g}")
-    stay = {name: tuple(_offset(joint).tolist()) for name, joint in joints.items()} if asked.motors else {}
+    stay = {name: values for name, values in read_joints(home).items() if asked.motors and name in joints}
     return {**stay, **given}
 
 
-@dataclass(frozen=True, eq=False)
-class _Wanted:
-    """Coordinates of a twin that are wanted: names, places and values, one for each number."""
-
-    names: tuple[str, ...]
-    places: tuple[int, ...]
-    values: Array
-
-    @classmethod
-    def of(cls, twin: PinocchioModel, wanted: Mapping[str, tuple[float, ...]]) -> _Wanted:
-        joints = [twin.mechanism.joints[name] for name in wanted]
-        values = [(np.array(wanted[joint.name]) - _offset(joint)) / _units(joint, twin.length) for joint in joints]
-        names = tuple(joint.name for joint in joints for _ in range(joint.type.freedoms))
-        return cls(names, tuple(i for joint in joints for i in twin.coordinates[joint.name]), np.concatenate(values))
-
-    def chosen(self, some: Array) -> _Wanted:
-        """Some of them, by number."""
-        return _Wanted(tuple(self.names[i] for i in some), tuple(self.places[i] for i in some), self.values[some])
-
-
-def _lead(home: ClosedConfiguration, motion: PlatformMotion, wanted: _Wanted, asked: JointPose) -> ClosedConfiguration:
+def _lead(
+    home: ClosedConfiguration, motion: PlatformMotion, wanted: Mapping[str, tuple[float, ...]], asked: JointPose
+) -> ClosedConfiguration:
     """Steps from the zero configuration to coordinates, as many of them at a time as can be chosen one by one."""
     from scipy.linalg import qr
 
-    twin, name = home.twin, home.twin.mechanism.name
-    rows = np.eye(twin.nv)[list(wanted.places)] @ home.kernel()[0]
+    twin, robot = home.twin, home.twin.mechanism
+    joints = [robot.joints[name] for name in wanted]
+    names = [joint.name for joint in joints for _ in range(joint.type.freedoms)]
+    places = np.array([i for joint in joints for i in twin.coordinates[joint.name]])
+    values = np.concatenate([(wanted[each.name] - _offset(each)) / _units(each, twin.length) for each in joints])
+    rows = np.eye(twin.nv)[places] @ home.kernel()[0]
     rank = range_basis(rows, 1.0)[1].value
-    free = wanted.chosen(np.sort(qr(rows.T, mode="r", pivoting=True)[1][:rank]))
-    begun = twin.difference(twin.q0, home.q)[list(free.places)]
-    aim, stops = JointAim(free.places, begun, free.values), Stops.of(twin, home.q)
-    every = tuple(i for joint in counted_joints(twin.mechanism) for i in twin.coordinates[joint.name])
-    at_zero = twin.difference(twin.q0, home.q)[list(every)]
-    rest = JointAim(every, at_zero, at_zero)
+    free = np.sort(qr(rows.T, mode="r", pivoting=True)[1][:rank])
+    at_zero = twin.difference(twin.q0, home.q)
+    every = np.array([i for joint in counted_joints(robot) for i in twin.coordinates[joint.name]])
+    rest = JointAim(every, at_zero[every], at_zero[every])
+    stops = Stops.of(twin, home.q)
     before, here, came = stops.margins(twin, home.q), home, 0.0
 
     def past(at: ClosedConfiguration) -> dict[str, float]:
@@ -211,29 +199,28 @@ def _lead(home: ClosedConfiguration, motion: PlatformMotion, wanted: _Wanted, as
         return {joint: margin for joint, margin in margins if margin < min(before[joint], 0.0) - SAME_POINT}
 
     def refuse(stopped: str) -> PoseNotReached:
-        last = ",".join(f"{each:.6g}" for each in twin.difference(twin.q0, here.q)[list(free.places)])
+        told = read_joints(here)
+        last = ",".join(f"{joint}={'/'.join(f'{x:.6g}' for x in told[joint])}" for joint in wanted)
         way = f"; from its zero configuration the robot gets {100 * came:.3g} % of the way" * (came < 1)
-        return PoseNotReached(name, str(asked), came, last, reason=stopped + way)
+        return PoseNotReached(robot.name, str(asked), came, f"{asked.kind}:{last}", reason=stopped + way)
 
-    pieces = max(1, int(np.ceil(np.linalg.norm(free.values - begun) / STRIDE)))
-    for number in range(1, pieces + 1):
-        ahead = aim.towards(home.pose(motion.link), number / pieces)
-        step = replace(ahead, begun=aim.towards(home.pose(motion.link), came).values)
-        there, part = track(here, motion, step, home=rest)
+    goal = values[free]
+    pieces = max(1, int(np.ceil(np.linalg.norm(goal - at_zero[places[free]]) / STRIDE)))
+    for number, ends in enumerate(pairwise(np.linspace(at_zero[places[free]], goal, pieces + 1))):
+        there, part = track(here, motion, JointAim(places[free], *ends), home=rest)
         if over := past(there):
             raise refuse(f"{min(over, key=lambda joint: over[joint])} is at its limit")
-        here, came = there, (number - 1 + part) / pieces
+        here, came = there, (number + part) / pieces
         if part < 1:
-            J = np.eye(twin.nv)[list(free.places)] @ here.kernel()[0]
-            held = free.names[int(np.argmax(np.abs(np.linalg.svd(J)[0][:, -1])))]
+            J = np.eye(twin.nv)[places[free]] @ here.kernel()[0]
+            held = names[free[np.argmax(np.abs(np.linalg.svd(J)[0][:, -1]))]]
             raise refuse(f"a singularity lies ahead, at which {held} stops")
-    missed = JointAim(wanted.places, wanted.values, wanted.values).rows(twin, here.q)[0]
-    worst = int(np.argmax(np.abs(missed)))
-    if abs(missed[worst]) > AS_PRINTED:
-        joint = wanted.names[worst]
+    missed = np.abs(twin.difference(twin.q0, here.q)[places] - values)
+    if missed.max() > AS_PRINTED:
+        joint = names[int(np.argmax(missed))]
         told = "/".join(f"{x:.6g}" for x in read_joints(here)[joint])
         raise refuse(f"with the others as they are {joint} is {told}")
-    there = nearest(here, aim, rest)
+    there = nearest(here, JointAim(places[free], goal, goal), rest)
     return here if past(there) else there
 
 

@@ -297,7 +297,7 @@ def modes(
     if isinstance(asked, ModeNumber):
         at, asked = at_mode(modes(setting), asked), None
     elif isinstance(asked, JointPose):
-        at, asked = reach_joints(setting.robot, setting.everything.start, setting.motion, asked), None
+        at, asked = reach_joints(setting.everything.start, setting.motion, asked), None
     setting = setting if asked is None else setting.telling([asked])
     motion, wanted = setting.motion, None
     goal = at if isinstance(at, ClosedConfiguration) else setting.everything.start
