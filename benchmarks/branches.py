@@ -35,7 +35,7 @@ def proved(name: str, half: float) -> BranchProof | None:
             low, high = limits.get(joint.name, (-half, half))
             box[joint.name] = max(low, -half), min(high, half)
     found = hrsynth.branch(name, box, effort=CELLS)
-    return found if all(part.share == 1.0 for part in found.parts) else None
+    return found if all(part.volume_fraction == 1.0 for part in found.parts) else None
 
 
 def row(name: str, seconds: int) -> str:
@@ -67,11 +67,11 @@ def row(name: str, seconds: int) -> str:
     half, found, spent = best
     back = (
         "all of it"
-        if found.back is not None
-        and (found.back[0] == found.proved[0]).all()
-        and (found.back[1] == found.proved[1]).all()
+        if found.injective_box is not None
+        and (found.injective_box[0] == found.proved[0]).all()
+        and (found.injective_box[1] == found.proved[1]).all()
         else "a part"
-        if found.back is not None
+        if found.injective_box is not None
         else "undecided"
     )
     return f"| {name} | ± {half:.2g} | {sum(len(part.cells) for part in found.parts)} | {back} | {spent:.1f} |"
@@ -80,5 +80,5 @@ def row(name: str, seconds: int) -> str:
 if __name__ == "__main__":
     print("| robot | proved box (m, rad) | cells | way back | s |")
     print("| --- | --- | --- | --- | --- |")
-    for each in sys.argv[2:] or hrsynth.shipped():
+    for each in sys.argv[2:] or hrsynth.list_robots():
         print(row(each, int(sys.argv[1]) if len(sys.argv) > 1 else 30), flush=True)

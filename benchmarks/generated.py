@@ -168,13 +168,13 @@ def generated() -> Iterator[Row]:
         )
         made = ModuleType("made")
         exec(export(robot, "numpy", box).code, made.__dict__)
-        twin = PinocchioModel(robot)
+        model = PinocchioModel(robot)
         few = rows[:200]
         batch, loop = least(
             lambda q=rows, made=made: made.forward(q),
-            lambda q=few, twin=twin, motors=motors: [_pinocchio(twin, motors, each) for each in q],
+            lambda q=few, model=model, motors=motors: [_pinocchio(model, motors, each) for each in q],
         )
-        gap = max(np.abs(made.forward(each)[3][0] - _pinocchio(twin, motors, each)).max() for each in few[:20])
+        gap = max(np.abs(made.forward(each)[3][0] - _pinocchio(model, motors, each)).max() for each in few[:20])
         if not gap < 1e-9:
             raise SystemExit(f"{name}: platforms differ by {gap:.2g} m")
         yield (
@@ -189,18 +189,18 @@ def _name(robot: str) -> str:
     return f"_{robot}" if robot[0].isdigit() else robot
 
 
-def _pinocchio(twin: PinocchioModel, motors: list[str], values: Array) -> Array:
+def _pinocchio(model: PinocchioModel, motors: list[str], values: Array) -> Array:
     """The platform's position (3,) by Newton's method on Pinocchio's constraints, from zero."""
-    driven = [i for name in motors for i in twin.coordinates[name]]
-    passive = [i for i in range(twin.nv) if i not in driven]
-    step = np.zeros(twin.nv)
+    driven = [i for name in motors for i in model.coordinates[name]]
+    passive = [i for i in range(model.nv) if i not in driven]
+    step = np.zeros(model.nv)
     step[driven] = values
-    q = twin.integrate(twin.q0, step)
+    q = model.integrate(model.q0, step)
     for _ in range(30):
-        x = np.linalg.lstsq(twin.jacobian(q)[:, passive], -twin.residual(q), rcond=1e-9)[0]
-        step = np.zeros(twin.nv)
+        x = np.linalg.lstsq(model.jacobian(q)[:, passive], -model.residual(q), rcond=1e-9)[0]
+        step = np.zeros(model.nv)
         step[passive] = x
-        q = twin.integrate(q, step)
+        q = model.integrate(q, step)
         if np.abs(x).max() <= 1e-12:
             break
-    return np.asarray(twin.pose(q, twin.mechanism.platform)[:3, 3])
+    return np.asarray(model.pose(q, model.mechanism.platform)[:3, 3])

@@ -59,9 +59,9 @@ def alone(command: Sequence[str]) -> tuple[float, float]:
 
 
 def compiled(robot: str) -> tuple[ObservedRobot, Batch]:
-    setting = ObservedRobot.of(load(robot))
-    assert setting.batch is not None
-    return setting, setting.batch
+    setup = ObservedRobot.of(load(robot))
+    assert setup.batch is not None
+    return setup, setup.batch
 
 
 def plane(batch: Batch, size: float, phi: float = 0.0, side: int = SIDE) -> Array:

@@ -23,18 +23,18 @@ from hrsynth.analysis.exact import architecture
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.catalog import load as load_catalog
 from hrsynth.catalog import store
+from hrsynth.catalog.architecture_key import parse
 from hrsynth.catalog.build import without_motors
 from hrsynth.catalog.entry import entry
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.groups import GROUPS
 from hrsynth.catalog.query import count
-from hrsynth.catalog.words import parse
-from hrsynth.description import load, shipped
+from hrsynth.description import list_robots, load
 from hrsynth.description.formats.mjcf.write import write
 from hrsynth.errors import HrsynthError
 from hrsynth.geometry.ranks import kernel_basis, largest_angle, range_basis
 from hrsynth.geometry.vectors import Array
-from hrsynth.kinematics.locked import rezero
+from hrsynth.kinematics.locked_twists import rezero
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.present.text.catalog import entries
 
@@ -123,7 +123,7 @@ def jacobians() -> Iterator[Row]:
         return
     for robot in ("quattro", "gough_stewart", "delta"):
         here = rezero(ObservedRobot.of(load(robot), samples=3).configurations[0])
-        twin = PinocchioModel(here)
+        robot_model = PinocchioModel(here)
         model = mujoco.MjModel.from_xml_string(write(here).texts[0])
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT
         model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
@@ -141,24 +141,28 @@ def jacobians() -> Iterator[Row]:
         V = np.zeros((6, model.nv))
         J = theirs(model.qpos0)
         mujoco.mj_jacBody(model, data, V[:3], V[3:], model.body(here.platform).id)
-        own = twin.velocity(twin.q0, here.platform) @ kernel_basis(twin.jacobian(twin.q0))[0]
+        own = (
+            robot_model.velocity(robot_model.q0, here.platform) @ kernel_basis(robot_model.jacobian(robot_model.q0))[0]
+        )
         other = V @ kernel_basis(J)[0]
-        own[:3] *= twin.length
+        own[:3] *= robot_model.length
         angle = largest_angle(range_basis(own, 1.0)[0], range_basis(other, 1.0)[0])
         if not angle < 1e-5:
             raise SystemExit(f"{robot}: the platform's twists differ by {angle:.2g} rad")
         rng = np.random.default_rng(0)
-        places = [twin.integrate(twin.q0, AROUND * rng.normal(size=twin.nv)) for _ in range(EVALUATIONS)]
+        places = [
+            robot_model.integrate(robot_model.q0, AROUND * rng.normal(size=robot_model.nv)) for _ in range(EVALUATIONS)
+        ]
         others = [model.qpos0.copy() for _ in places]
         for q in others:
             mujoco.mj_integratePos(model, q, rng.normal(size=model.nv), AROUND)
         mine, other_time = least(
-            lambda twin=twin, places=places: deque(map(twin.jacobian, places), 0),
+            lambda model=model, places=places: deque(map(model.jacobian, places), 0),
             lambda theirs=theirs, others=others: deque(map(theirs, others), 0),
         )
         yield (
             f"the loops' Jacobian of one configuration, {robot}",
-            f"{1e6 * mine / EVALUATIONS:.1f} µs ({' × '.join(map(str, twin.jacobian(twin.q0).shape))})",
+            f"{1e6 * mine / EVALUATIONS:.1f} µs ({' × '.join(map(str, robot_model.jacobian(robot_model.q0).shape))})",
             f"MuJoCo on the written MJCF: {1e6 * other_time / EVALUATIONS:.1f} µs ({' × '.join(map(str, J.shape))})",
             f"{other_time / mine:.1f}",
         )
@@ -166,7 +170,7 @@ def jacobians() -> Iterator[Row]:
 
 def derivations() -> Row:
     spent = []
-    for robot in shipped():
+    for robot in list_robots():
         mechanism = load(robot)
         start = time.process_time()
         derive(mechanism)
@@ -259,7 +263,7 @@ def questions(file: Path) -> Row:
 
 def verdicts(seed: int) -> float:
     """Exact verdicts a second, by the clock, of architectures of all groups."""
-    settings = [setting for words in _chosen(seed) for setting in _prepared(words)]
+    settings = [setup for words in _chosen(seed) for setup in _prepared(words)]
     clock = time.perf_counter
     (exact,) = least(lambda: [architecture(each).verdict(each.observed) for each in settings], turns=3, clock=clock)
     return len(settings) / exact
@@ -276,12 +280,12 @@ def _prepared(words: list[str]) -> Iterator[ObservedRobot]:
     found = 0
     for word in words:
         try:
-            setting = ObservedRobot.of(mechanism(parse(word).driven), samples=10)
+            setup = ObservedRobot.of(mechanism(parse(word).driven), samples=10)
         except HrsynthError:
             continue
-        if setting.dof and found < EXACT:
+        if setup.dof and found < EXACT:
             found += 1
-            yield setting
+            yield setup
 
 
 if __name__ == "__main__":

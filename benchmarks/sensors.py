@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from measure import least
 
+from hrsynth.analysis.analysis_declaration import clear_cache
 from hrsynth.analysis.derive import derive
-from hrsynth.analysis.question import forget
 
 ROBOT = "gough_stewart"
 POINTS = [f"point:platform@{at}" for at in ("0.1,0,0", "-0.1,0.1,0", "0,0.1,0.1")]
@@ -13,7 +13,7 @@ POINTS = [f"point:platform@{at}" for at in ("0.1,0,0", "-0.1,0.1,0", "0,0.1,0.1"
 
 def asked(**options: object) -> None:
     """The question, with nothing remembered."""
-    forget()
+    clear_cache()
     derive(ROBOT, **options)  # type: ignore[arg-type]
 
 

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 import hrsynth
-from hrsynth.present.studio.desk import Desk
+from hrsynth.present.studio.analysis_service import AnalysisService
 
 STEPS = 20
-DESK = Desk()
+DESK = AnalysisService()
 
 
 def took(ask: Callable[[], Any]) -> tuple[Any, float, float]:
@@ -45,7 +45,7 @@ def main(*names: str) -> None:
     """Print the table."""
     print("| robot | moves a second (processor, clock) | slowest (s) | residual | first verdict (s) | a leg less (s) |")
     print("| --- | --- | --- | --- | --- | --- |")
-    for name in names or hrsynth.shipped():
+    for name in names or hrsynth.list_robots():
         robot = {"source": f"shipped:{name}"}
         _, _, first = took(lambda robot=robot: DESK.answer({"ask": "watch", "robot": robot}))  # type: ignore[misc]
         legs = [leg["name"] for leg in DESK.answer({"ask": "open", "robot": robot})["legs"] if leg["watched"]]

@@ -10,7 +10,7 @@ import time
 
 import hrsynth
 
-ROBOTS = list(hrsynth.shipped())[:20]
+ROBOTS = list(hrsynth.list_robots())[:20]
 POSES = 50
 
 
@@ -23,7 +23,7 @@ def weakest(robot: object) -> list[float | None]:
 
 if __name__ == "__main__":
     start = time.perf_counter()
-    found = hrsynth.map(weakest, ROBOTS, jobs=int(sys.argv[1]) if len(sys.argv) > 1 else None)
+    found = hrsynth.map_robots(weakest, ROBOTS, jobs=int(sys.argv[1]) if len(sys.argv) > 1 else None)
     took = time.perf_counter() - start
     for name, values in zip(ROBOTS, found, strict=True):
         known = [value for value in values if value is not None]

@@ -32,7 +32,7 @@ LOOPED = 300
 
 
 def exact_maxima() -> Iterator[Row]:
-    setting, batch = compiled("quattro")
+    setup, batch = compiled("quattro")
     phi = 0.2
     X = plane(batch, 0.25, phi)
     x, y, z = np.ascontiguousarray(X[:, :3, 3].T)
@@ -55,19 +55,19 @@ def exact_maxima() -> Iterator[Row]:
         same(found.orientation.largest, theirs[1], 1e-4)
     numba, plain, by, own = least(ours(True), ours(False), hand, tuned)
     question = replace(
-        setting.everything.question,
-        observations=tuple(o for o in setting.everything.question.observations if o.leg in legs),
+        setup.all_samples.observation_model,
+        observations=tuple(o for o in setup.all_samples.observation_model.observations if o.leg in legs),
     )
-    assert setting.placer is not None
-    some = [at for at in setting.placer.configurations(X[:: len(X) // LOOPED]) if at is not None]
-    twin = PinocchioModel(setting.mechanism)
+    assert setup.placer is not None
+    some = [at for at in setup.placer.configurations(X[:: len(X) // LOOPED]) if at is not None]
+    model = PinocchioModel(setup.mechanism)
     basis = batch.coordinates.twists
 
     def loop() -> None:
         found = []
         for at in some:
-            here = ClosedConfiguration(twin, at.q, at.residual)
-            rows, loops = question.rows(here), twin.jacobian(at.q)
+            here = ClosedConfiguration(model, at.q, at.residual)
+            rows, loops = question.rows(here), model.jacobian(at.q)
             wanted = np.vstack([np.zeros((len(loops), basis.shape[1])), basis])
             rates = np.linalg.lstsq(np.vstack([loops, rows[:6]]), wanted, rcond=1e-9)[0]
             found.append(rows[6:] @ rates)
@@ -97,9 +97,9 @@ def matrices() -> Iterator[Row]:
         ("3rrr_m1", 0.05, ("1", "2", "3"), planar),
     )
     for robot, size, legs, hand in cases:
-        setting, batch = compiled(robot)
+        setup, batch = compiled(robot)
         X = plane(batch, size, 0.1 if batch.coordinates.rotations.shape[1] else 0.0)
-        theirs = hand(setting, X, legs)
+        theirs = hand(setup, X, legs)
         M = batch.evaluate(X, legs, compiled=True).interaction_matrix
         same(np.linalg.norm(M, axis=(1, 2)), np.linalg.norm(theirs() * units(batch, theirs()), axis=(1, 2)), 1e-9)
         numba, plain, by = least(
@@ -118,27 +118,27 @@ def units(batch: Batch, M: Array) -> Array:
     return np.where(np.arange(M.shape[2]) < shifts, batch.length, 1.0)
 
 
-def rigid(setting: ObservedRobot, X: Array, legs: tuple[str, ...]) -> Callable[[], Array]:
+def rigid(setup: ObservedRobot, X: Array, legs: tuple[str, ...]) -> Callable[[], Array]:
     x, y, z = np.ascontiguousarray(X[:, :3, 3].T)
     return lambda: by_hand.quattro_rigid(x, y, z, (int(legs[0]) - 1, int(legs[1]) - 1))
 
 
-def pods(setting: ObservedRobot, X: Array, legs: tuple[str, ...]) -> Callable[[], Array]:
-    joints, home = setting.mechanism.joints, setting.motion.home
+def pods(setup: ObservedRobot, X: Array, legs: tuple[str, ...]) -> Callable[[], Array]:
+    joints, home = setup.mechanism.joints, setup.motion.home
     base = np.array([joints[f"shoulder_{leg}"].point for leg in legs])
     tips = (np.array([joints[f"wrist_{leg}"].point for leg in legs]) - home[:3, 3]) @ home[:3, :3]
     p, R = np.ascontiguousarray(X[:, :3, 3]), np.ascontiguousarray(X[:, :3, :3])
     return lambda: by_hand.pods(p, R, base, tips)
 
 
-def glide(setting: ObservedRobot, X: Array, legs: tuple[str, ...]) -> Callable[[], Array]:
+def glide(setup: ObservedRobot, X: Array, legs: tuple[str, ...]) -> Callable[[], Array]:
     P = np.ascontiguousarray(X[:, :3, 3])
     return lambda: by_hand.orthoglide(P, 0.31, 0.04, tuple(int(leg) - 1 for leg in legs))
 
 
-def planar(setting: ObservedRobot, X: Array, legs: tuple[str, ...]) -> Callable[[], Array]:
-    mechanism, home = setting.mechanism, setting.motion.home
-    chains = [[mechanism.joints[name].point for name in setting.anatomy.leg(leg).joints] for leg in legs]
+def planar(setup: ObservedRobot, X: Array, legs: tuple[str, ...]) -> Callable[[], Array]:
+    mechanism, home = setup.mechanism, setup.motion.home
+    chains = [[mechanism.joints[name].point for name in setup.decomposition.leg(leg).joints] for leg in legs]
     base, elbows, ends = (np.array([chain[i] for chain in chains]) for i in range(3))
     tips = ((ends - home[:3, 3]) @ home[:3, :3])[:, :2]
     cranks, rods = np.linalg.norm(elbows - base, axis=1), np.linalg.norm(ends - elbows, axis=1)
@@ -154,27 +154,24 @@ def other_twists() -> Iterator[Row]:
     _, six = compiled("gough_stewart")
     X = plane(six, 0.1)
     for robot in ("3rps", "rrrrr_m1", "rprpr_m1", "prrrp_m1", "i4l"):
-        setting, batch = compiled(robot)
-        walk = [at.pose(setting.mechanism.platform) for at in setting.configurations]
+        setup, batch = compiled(robot)
+        walk = [at.pose(setup.mechanism.platform) for at in setup.configurations]
         poses = np.resize(np.array(walk), X.shape)
         slides = None
         if batch.slides:
             far = [
                 [
-                    at.twin.difference(at.twin.q0, at.q)[at.twin.coordinates[name][0]] * at.twin.length
+                    at.model.difference(at.model.q0, at.q)[at.model.coordinates[name][0]] * at.model.length
                     for name in batch.slides
                 ]
-                for at in setting.configurations
+                for at in setup.configurations
             ]
             slides = np.resize(np.array(far), (len(X), len(batch.slides)))
         given = {"slides": slides, "compiled": False}
         found = batch.evaluate(poses, **given)
         assert found.reached[: len(walk)].all()
         u = np.array(
-            [
-                [at.pose(each.link)[:3, :3] @ each.direction for each in setting.segments]
-                for at in setting.configurations
-            ]
+            [[at.pose(each.link)[:3, :3] @ each.direction for each in setup.segments] for at in setup.configurations]
         )
         same(found.directions[: len(walk)], u, 1e-9)
         ours, theirs = least(

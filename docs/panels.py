@@ -50,10 +50,10 @@ def meshed(folder: Path) -> Path:
     import trimesh
 
     from hrsynth import load, save
-    from hrsynth.description import shipped
+    from hrsynth.description import list_robots
 
     robot = load("rrrrr_m1")
-    text = shipped()[robot.name].read_text(encoding="utf-8").replace('name="rrrrr_m1"', 'name="five_bar"')
+    text = list_robots()[robot.name].read_text(encoding="utf-8").replace('name="rrrrr_m1"', 'name="five_bar"')
     for name, link in robot.links.items():
         ends = [(np.linalg.inv(link.pose) @ [*joint.point, 1])[:3] for joint in robot.joints_of(name)]
         if name == robot.base or len(ends) < 2:

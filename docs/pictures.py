@@ -94,7 +94,7 @@ class Screen:
 
 PICTURES: dict[str, str | Page | SitePage | Family | Screen] = {
     "accuracy_quattro.png": "accuracy quattro --observe 1,4 --cone 0.1deg --plane z=-0.7",
-    "atlas_six_poses.png": Family("atlas", "six_poses"),
+    "atlas_six_poses.png": Family("aspects", "six_poses"),
     "basins_quattro.png": "basins quattro --observe 1,4 --to x=0,y=0,z=-0.7,phi=0 --plane z=-0.7,phi=0",
     "catalog.png": Page(
         "catalog site --group spatial --base-motors --verdict controllable --motion 3R", "-o", 1250, 1100, "index.html"

@@ -118,7 +118,7 @@ for error in np.radians([0.01, 0.1, 1.0]):
 # %%
 robot = three_rpr(motor=2, base=BASE, platform=BASE, home=(0.12, 0.3, 0.0))
 found = hrsynth.modes(robot, real=True)
-assert len(found.motions) == 1
+assert len(found.self_motions) == 1
 assert len(found.modes) == 2
 found
 
@@ -129,7 +129,7 @@ found
 # platform is turned.
 
 # %%
-(motion,) = found.motions
+(motion,) = found.self_motions
 print(f"length {motion.shift:.4f} m, circle {2 * np.pi * np.hypot(0.12, 0.3):.4f} m")
 assert 0.999 < motion.shift / (2 * np.pi * np.hypot(0.12, 0.3)) < 1
 places = np.array([each["platform"][:2, 3] for each in motion.way])
@@ -179,7 +179,7 @@ for name, base in bases.items():
 # %%
 similar = hrsynth.modes(gough_stewart(base_half=np.radians(20), platform_half=np.radians(40)), real=True)
 print(similar)
-assert len(similar.motions) == 1
+assert len(similar.self_motions) == 1
 
 # %% [markdown]
 # ## Exercises
@@ -207,8 +207,8 @@ assert np.linalg.svd(poses[:, :3, 3] - poses[:, :3, 3].mean(0))[1][1] < 1e-9
 smaller = tuple((0.99 * radius, angle) for radius, angle in BASE)
 single = hrsynth.modes(three_rpr(motor=2, base=BASE, platform=smaller, home=(0.12, 0.3, 0.0)), real=True)
 print(single)
-assert not single.motions
+assert not single.self_motions
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 3. where the proximal links are parallel: there the two circles touch, and if these links are equal too, they are one
-print(hrsynth.singular(hrsynth.load("rrrrr_m1"), points=100).words)
+print(hrsynth.singularities(hrsynth.load("rrrrr_m1"), points=100).words)

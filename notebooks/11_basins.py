@@ -20,14 +20,14 @@ def shown(found):
     cells = np.ma.masked_less(found.cells, 0)
     drawn = place.pcolormesh(x, y, cells.T, cmap="viridis", vmin=0, vmax=max(1, len(found.ends) - 1))
     bar = figure.colorbar(drawn, ticks=range(len(found.ends)))
-    bar.ax.set_yticklabels([each.ending.name for each in found.ends])
+    bar.ax.set_yticklabels([each.run_outcome.name for each in found.ends])
     place.set(xlabel="x (m)", ylabel="y (m)", aspect="equal")
     plt.show()
 
 
 def reached(found):
     """How many starts come to the goal."""
-    return int(sum((found.cells == i).sum() for i, each in enumerate(found.ends) if each.ending.name == "goal"))
+    return int(sum((found.cells == i).sum() for i, each in enumerate(found.ends) if each.run_outcome.name == "goal"))
 
 
 # %% [markdown]
@@ -64,8 +64,8 @@ two = hrsynth.basins("quattro", ["2", "3"], to=goal, grid=starts, jobs=1)
 print(two)
 shown(two)
 assert 2.5 < reached(two) / reached(four) < 3
-assert {each.ending.name for each in four.ends} == {"goal", "local minimum"}
-assert {each.ending.name for each in two.ends} == {"goal", "mode", "boundary"}
+assert {each.run_outcome.name for each in four.ends} == {"goal", "local minimum"}
+assert {each.run_outcome.name for each in two.ends} == {"goal", "mode", "boundary"}
 
 # %% [markdown]
 # With two legs nearly three times as many of these starts come to the goal as with four. The other runs of the four
@@ -92,7 +92,7 @@ for legs in (None, ["2", "3"]):
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 1. the angles between the directions there and those of the goal
-end = next(each for each in four.ends if each.ending.name == "local minimum")
+end = next(each for each in four.ends if each.run_outcome.name == "local minimum")
 batch = hrsynth.observe("quattro").batch
 there, wanted = batch.evaluate(np.stack([end.X, four.target.pose(batch.coordinates.link)])).directions
 assert end.pose.z < -0.5

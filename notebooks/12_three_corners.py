@@ -156,9 +156,9 @@ by_three = [hrsynth.servo(three, start=start, goal=GOAL) for start in starts]
 for found in by_three:
     C = found.settled.pose("camera")[:3, 3]
     nearest = min(np.linalg.norm(C - other) for other, _ in poses)
-    print(f"{found.ended:16}", C.round(3), "nearest of the poses above:", f"{1e3 * nearest:.3g} mm")
+    print(f"{found.outcome:16}", C.round(3), "nearest of the poses above:", f"{1e3 * nearest:.3g} mm")
     assert nearest < 1e-6
-    assert found.ended in ("goal", "mode")
+    assert found.outcome in ("goal", "mode")
 
 # %% [markdown]
 # Runs that end in a *mode* reached another of the poses that Grunert's equation lists. The cylinder and the poses
@@ -175,7 +175,7 @@ for found in by_three:
 square = np.vstack([CORNERS, [[0.15, -0.3, 0]]])
 four = seeing(square)
 for start in starts[:4]:
-    by_four = hrsynth.servo(four, start=start, goal=GOAL).ended
+    by_four = hrsynth.servo(four, start=start, goal=GOAL).outcome
     print(by_four)
     assert by_four == "goal"
 on = middle + [0, radius, 0.9]
@@ -234,7 +234,7 @@ print("on:", f"at most {least['on'][1]:.1e};", "off:", f"at least {least['off'][
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 3. of these eight starts more reach the goal; but the other poses remain, and one run still ends at one
-by_depth = [hrsynth.servo(three, start=start, goal=GOAL, depth="desired").ended for start in starts]
-reached = [[found.ended for found in by_three].count("goal"), by_depth.count("goal")]
+by_depth = [hrsynth.servo(three, start=start, goal=GOAL, depth="desired").outcome for start in starts]
+reached = [[found.outcome for found in by_three].count("goal"), by_depth.count("goal")]
 print("goal reached with the depths of each image:", reached[0], "of 8; with those at the goal:", reached[1], "of 8")
 assert reached == [4, 7]

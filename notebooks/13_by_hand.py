@@ -233,7 +233,7 @@ assert ends[1.0][-1] < ends[1.8][-1] < ends[1.8][0] < ends[2.1][-1]
 # %%
 for name in ("uranesx", "i4l", "linear_delta", "orthoglide"):
     verdict = hrsynth.derive(name).verdict
-    print(f"{name:13}{verdict.verdict:24}", *(f"loses {freedom.name}" for freedom in verdict.lost))
+    print(f"{name:13}{verdict.verdict:24}", *(f"loses {freedom.name}" for freedom in verdict.unobserved))
     assert (verdict.verdict == "controllable") == (name in ("linear_delta", "orthoglide"))
 
 # %% [markdown]

@@ -113,7 +113,7 @@ hrsynth.draw(hidden)
 # between these two linear relations would be far from zero at most of them.
 
 # %%
-print(hidden.certificate)
+print(hidden.equivalence)
 
 # %% [markdown]
 # The two poses are now the *assembly modes* of the hidden robot. `modes` lists all of them, with a proof that there
@@ -148,7 +148,7 @@ hrsynth.draw(found)
 goal = "x=0.02,y=0.3"
 reaching = hrsynth.servo(robot, start="x=0.02,y=0.1", goal=goal)
 print(repr(reaching))
-assert reaching.ended == "goal"
+assert reaching.outcome == "goal"
 
 # %% [markdown]
 # But from a start that is much nearer to the goal it ends far away from it, although both errors go to zero:
@@ -156,8 +156,8 @@ assert reaching.ended == "goal"
 # %%
 run = hrsynth.servo(robot, start="x=0,y=0.345", goal=goal)
 metres, _ = run.from_goal
-print(f"ended: {run.ended}, mode {run.ending.matched}, {1e3 * metres:.0f} mm from the goal")
-assert run.ended == "mode"
+print(f"ended: {run.outcome}, mode {run.run_outcome.matched}, {1e3 * metres:.0f} mm from the goal")
+assert run.outcome == "mode"
 assert metres > 0.3
 hrsynth.draw(run)
 
@@ -182,7 +182,7 @@ assert answer.verdict == "undecided"
 hrsynth.draw(hrsynth.check(robot, grid="x=-0.06:0.06:17,y=0.29:0.35:25"))
 
 # %%
-condition = hrsynth.singular(robot, points=200)
+condition = hrsynth.singularities(robot, points=200)
 condition
 
 # %% [markdown]

@@ -13,11 +13,19 @@
 from dataclasses import replace
 
 import hrsynth
-from hrsynth.kinematics.certificate import certify
+from hrsynth.kinematics.equivalence import check_equivalence
 from hrsynth.mechanism.builder import Builder
 from hrsynth.rewrite.evidence import Evidence
 from hrsynth.rewrite.rule import Refusal
-from hrsynth.rewrite.rules import anchor_locus, direction_locus, lift, motors_off, pi_form, prismatic_merge, takeover
+from hrsynth.rewrite.rules import (
+    anchor_locus,
+    direction_locus,
+    joint_substitution,
+    lift,
+    motors_off,
+    pi_form,
+    prismatic_merge,
+)
 from hrsynth.rewrite.state import State
 
 
@@ -55,13 +63,13 @@ leg
 
 # %%
 setting = hrsynth.observe(leg)
-evidence = Evidence(setting.anatomy, setting.samples)  # what the rules may know: how the leg moves
-start = State(setting.anatomy, replace(setting.mechanism, observations=()))
+evidence = Evidence(setting.decomposition, setting.samples)  # what the rules may know: how the leg moves
+start = State(setting.decomposition, replace(setting.mechanism, observations=()))
 
 
 def compared(state):
     """The certificate of a rewritten robot, at three configurations."""
-    return certify(setting.samples, state.mechanism, count=3, complete=False)
+    return check_equivalence(setting.samples, state.mechanism, count=3, complete=False)
 
 
 def step(state, module, trust=False):
@@ -132,7 +140,7 @@ state = step(state, anchor_locus)
 # Fig. 2(b)).
 
 # %%
-state = step(state, takeover)
+state = step(state, joint_substitution)
 
 # %% [markdown]
 # ## The parallelogram
@@ -200,11 +208,11 @@ assert (found.verdict.rank, found.verdict.dof) == (2, 2)
 
 # %%
 setting = hrsynth.observe(rrs)
-evidence = Evidence(setting.anatomy, setting.samples)
-state = State(setting.anatomy, replace(setting.mechanism, observations=()))
+evidence = Evidence(setting.decomposition, setting.samples)
+state = State(setting.decomposition, replace(setting.mechanism, observations=()))
 for module in (motors_off, lift, anchor_locus):
     state = step(state, module)
-trusted = step(state, takeover, trust=True)
+trusted = step(state, joint_substitution, trust=True)
 
 # %% [markdown]
 # This is the division of labour: *rules propose, the certificate disposes*. A rule may be too bold. The result is
@@ -237,8 +245,8 @@ b.joint("slide", "P", "tube", "rod", at=(0.2, 0.05, 0.3), axis=(0.4, 0.1, 0.6), 
 b.joint("wrist", "S", "rod", "platform", at=(0.4, 0.1, 0.6))
 ups = b.build(platform="platform")
 setting = hrsynth.observe(ups)
-evidence = Evidence(setting.anatomy, setting.samples)
-state = State(setting.anatomy, replace(setting.mechanism, observations=()))
+evidence = Evidence(setting.decomposition, setting.samples)
+state = State(setting.decomposition, replace(setting.mechanism, observations=()))
 for module in (motors_off, lift, direction_locus, anchor_locus, prismatic_merge):
     state = step(state, module)
 assert str(state.architecture()) == str(hrsynth.derive(ups).hidden_architecture)
@@ -261,5 +269,5 @@ assert all(each.rule != "pi form" or not each.accepted for each in pus.steps)
 # 3. both are the same to the camera: both certificates pass with angles at rounding
 for form in ("general", "simplified"):
     found = hrsynth.derive(leg, form=form)
-    print(f"{form:10}  {found.hidden_architecture!s:12}  {found.certificate}")
-    assert found.certificate.passed
+    print(f"{form:10}  {found.hidden_architecture!s:12}  {found.equivalence}")
+    assert found.equivalence.passed

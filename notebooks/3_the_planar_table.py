@@ -31,7 +31,7 @@ print(row("robot", "real", "hidden", "verdict", "seen", "modes (real of complex)
 for name, found in derived.items():
     listed = found.modes()
     numbers[name] = (len(listed.modes), listed.found.complex)
-    count = "a continuum" if listed.found.continuum else f"{len(listed.modes)} of {listed.found.complex}"
+    count = "a continuum" if listed.found.continuous_family else f"{len(listed.modes)} of {listed.found.complex}"
     print(
         row(
             name,
@@ -51,7 +51,7 @@ PRINTED = {"3rrr": "ΠR̲R", "3rpr": "R̲PR", "3prr": "PR̲R", "3ppr": None, "3p
 for name, found in derived.items():
     leg = PRINTED[name.split("_")[0]]
     assert str(found.hidden_architecture) == f"3-{leg}" if leg else found.hidden_architecture is None
-    assert found.certificate.passed
+    assert found.equivalence.passed
 print("the same hidden legs as in MMT Table 1, each certified")
 
 # %% [markdown]
@@ -113,7 +113,7 @@ assert six.found.complete
 # translation). That is what `singular` says, and its expression is the determinant of three lines:
 
 # %%
-condition = hrsynth.singular(derived["3rrr_m1"].robot, points=300)
+condition = hrsynth.singularities(derived["3rrr_m1"].robot, points=300)
 print(condition.words)
 print(condition.condition.expression)
 print(condition.checked.points, "poses compared,", condition.checked.disagreements, "disagreements")
@@ -180,7 +180,7 @@ assert str(cranks.hidden_architecture) == str(cranks.architecture)
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 2. yes: the motor and the watched direction are the same angle, so both conditions are the same one
 for real in (False, True):
-    print(hrsynth.singular(derived["3rpr_m1"].robot, real=real, points=100).condition.expression)
+    print(hrsynth.singularities(derived["3rpr_m1"].robot, real=real, points=100).condition.expression)
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 3. each leg of 3rrp tells the platform's turn, so any one leg sees all that can be seen

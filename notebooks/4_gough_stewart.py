@@ -128,7 +128,7 @@ for _ in range(6):
     try:
         start = f"x={x:.3f},y={y:.3f},z={z:.3f},rpy=0/0/{turn:.2f}"
         run = hrsynth.servo(robot, ["1", "3", "5"], start=start, goal=POSE)
-        ends[run.ended if run.ending.matched is None else f"mode {run.ending.matched}"] += 1
+        ends[run.outcome if run.run_outcome.matched is None else f"mode {run.run_outcome.matched}"] += 1
     except HrsynthError as error:
         ends[type(error).__name__] += 1
 assert all(name == "goal" or name.startswith("mode") for name in ends), ends
@@ -147,7 +147,7 @@ dict(ends)
 # `singular` finds this condition by itself and checks it against the rank:
 
 # %%
-condition = hrsynth.singular(robot, ["1", "3", "5"], points=300)
+condition = hrsynth.singularities(robot, ["1", "3", "5"], points=300)
 print(condition.words)
 print(condition.condition.expression)
 print(condition.checked.points, "poses compared,", condition.checked.disagreements, "disagreements")
@@ -170,7 +170,7 @@ print("the platform's plane misses that point by", abs(normal @ (point - B[0])),
 print("smallest singular value of Mᵀ there:", example.sigma)
 assert abs(normal @ (point - B[0])) < 1e-9
 assert example.sigma < 1e-9
-print("lost:", "; ".join(freedom.name for freedom in example.lost))
+print("lost:", "; ".join(freedom.name for freedom in example.unobserved))
 
 # %%
 figure = plt.figure(figsize=(7.5, 6.5))
@@ -197,7 +197,7 @@ plt.show()
 
 # %%
 everything = hrsynth.modes(robot, at=POSE)
-print(len(everything.modes), "mode,", len(everything.near), "near modes")
+print(len(everything.modes), "mode,", len(everything.near_modes), "near modes")
 assert len(everything.modes) == 1
 
 # %% [markdown]
@@ -213,7 +213,7 @@ assert len(everything.modes) == 1
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 1. seen from the platform, base and platform change places: the planes go through the points A_i of the base
-print(hrsynth.singular(robot, ["1", "3", "5"], camera="platform", points=100).words)
+print(hrsynth.singularities(robot, ["1", "3", "5"], camera="platform", points=100).words)
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 2. two legs; the third must stay as a passive leg, because without it the platform could turn

@@ -86,8 +86,8 @@ runs = {legs: hrsynth.servo(robot, list(legs), start=START, goal=GOAL) for legs 
 for run in runs.values():
     metres, radians = run.from_goal
     away = f"{1e3 * metres:.1f} mm and {np.degrees(radians):.1f}° from the goal"
-    print(f"legs {', '.join(run.setting.labels)}: {run.ended}, {away}")
-assert [run.ended for run in runs.values()] == ["mode", "goal"]
+    print(f"legs {', '.join(run.setup.labels)}: {run.outcome}, {away}")
+assert [run.outcome for run in runs.values()] == ["mode", "goal"]
 hrsynth.draw(runs["14"])
 
 # %% [markdown]
@@ -104,7 +104,7 @@ for legs in ("14", "23"):
     assert answer.verdict == "same aspect"
     assert ("in the other working mode of leg 1, 4" in answer.reason) == (legs == "14")
 print()
-print(hrsynth.singular(robot, ["1", "4"], points=200).words)
+print(hrsynth.singularities(robot, ["1", "4"], points=200).words)
 
 # %% [markdown]
 # The paper prints digits of the modes too. They are not quite those that its own dimensions give: the second mode of
@@ -163,15 +163,15 @@ best
 
 # %%
 printed = hrsynth.servo(robot, start="x=0.028,y=0,z=-0.617,phi=0", goal="x=-0.6,y=0,z=-0.8,phi=0")
-print(printed.ended, "at", printed.pose)
-assert printed.ended == "goal"
+print(printed.outcome, "at", printed.pose)
+assert printed.outcome == "goal"
 
 # %% [markdown]
 # But the phenomenon is real. A search over random starts and goals found this run:
 
 # %%
 stuck = hrsynth.servo(robot, start="x=-0.3,y=0,z=-0.6,phi=0", goal="x=0.05,y=0.07,z=-0.52,phi=0")
-assert stuck.ended == "local minimum"
+assert stuck.outcome == "local minimum"
 stuck
 
 # %% [markdown]
@@ -179,7 +179,7 @@ stuck
 # and measure the error at each. (`batch` gives the directions of many poses at once.)
 
 # %%
-setting = stuck.setting
+setting = stuck.setup
 X, Y = (at.pose(setting.motion.link) for at in (stuck.settled, stuck.target))
 
 
@@ -262,4 +262,4 @@ assert noisy.spread.rms_metres < bound
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 3. the planes of MMT have the tangents as their normals: parallel planes are parallel tangents, and a determinant with
 #    two parallel vectors is zero; but it is zero too wherever e, τ1 and τ4 lie in one plane
-print(hrsynth.singular(robot, ["1", "4"], points=50).condition.expression)
+print(hrsynth.singularities(robot, ["1", "4"], points=50).condition.expression)

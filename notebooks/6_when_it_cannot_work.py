@@ -32,7 +32,7 @@ hrsynth.draw(hidden)
 # changes. This is not a singularity that one could avoid. It is so at every pose:
 
 # %%
-print(hrsynth.singular(robot).words)
+print(hrsynth.singularities(robot).words)
 print("smallest sets that see as much as can be seen:", hrsynth.legs(robot).smallest)
 
 # %% [markdown]
@@ -58,7 +58,7 @@ assert values[:, 0].min() > 0.5
 for name in ("prrrp_m1", "prrrp_parallel"):
     found = hrsynth.derive(hrsynth.load(name))
     print(f"{name:16}{found.hidden_architecture!s:12}{found.verdict.verdict}")
-print(hrsynth.singular(hrsynth.load("prrrp_m1"), points=100).words)
+print(hrsynth.singularities(hrsynth.load("prrrp_m1"), points=100).words)
 
 # %% [markdown]
 # ## UraneSX, Hexaglide, I4L
@@ -69,7 +69,7 @@ print(hrsynth.singular(hrsynth.load("prrrp_m1"), points=100).words)
 # %%
 for name in ("uranesx", "hexaglide", "i4l", "linear_delta", "orthoglide"):
     verdict = hrsynth.derive(hrsynth.load(name)).verdict
-    lost = "; ".join(freedom.name for freedom in verdict.lost) or "–"
+    lost = "; ".join(freedom.name for freedom in verdict.unobserved) or "–"
     assert (verdict.verdict == "controllable") == (name in ("linear_delta", "orthoglide"))
     print(f"{name:14}{verdict.verdict:24}rank {verdict.rank} of {verdict.dof}   lost: {lost}")
 
@@ -162,4 +162,4 @@ print(hrsynth.advise(hrsynth.load("delta"), ["1"]))
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 3. the condition of linear_delta: the P axes must all be parallel, so two parallel rails do no harm
-print(hrsynth.singular(hrsynth.load("linear_delta"), points=50).words)
+print(hrsynth.singularities(hrsynth.load("linear_delta"), points=50).words)

@@ -14,9 +14,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import hrsynth
+from hrsynth.catalog.architecture_key import parse
 from hrsynth.catalog.drawing import drawing
 from hrsynth.catalog.geometry import mechanism
-from hrsynth.catalog.words import parse
 
 plt.style.use("hrsynth.present.style")
 catalog = hrsynth.catalog.load()

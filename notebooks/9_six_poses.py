@@ -42,7 +42,7 @@ hrsynth.draw(listed)
 # %%
 idle = hrsynth.servo(robot, start="mode:1", goal="mode:5")
 print(idle)
-assert idle.ended == "mode"
+assert idle.outcome == "mode"
 
 # %% [markdown]
 # ## The atlas
@@ -50,7 +50,7 @@ assert idle.ended == "mode"
 # Two modes lie in one *aspect* if a path without Type 2 singularity joins them. Which do?
 
 # %%
-atlas = hrsynth.atlas(robot)
+atlas = hrsynth.aspects(robot)
 print(atlas)
 assert atlas.cuspidal
 assert atlas.aspects_met == "2"
@@ -76,7 +76,7 @@ print(path)
 # %%
 run = hrsynth.servo(robot, start=f"mode:{one}", goal=f"mode:{other}", duration=30, time=40)
 print(run)
-assert run.ended == "goal"
+assert run.outcome == "goal"
 
 # %%
 hrsynth.draw(run)
@@ -151,15 +151,15 @@ assert least > 1e-3
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 1. yes: two of its modes are joined, and no leg has to change its working mode
-print(hrsynth.atlas("quattro", "1,4"))
+print(hrsynth.aspects("quattro", "1,4"))
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 2. the modes stay where they are, as their circles do; which path joins them changes
 for rods in ((0.3, 0.3, 0.3), (0.2, 0.25, 0.4)):
-    found = hrsynth.atlas(six_poses(rods=rods))
+    found = hrsynth.aspects(six_poses(rods=rods))
     print(rods, len(found.places), "modes, aspects:", found.aspects_met, "cuspidal:", found.cuspidal)
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 3. the leg that is watched first is held
-found = hrsynth.atlas(robot, ["2", "1", "3"])
+found = hrsynth.aspects(robot, ["2", "1", "3"])
 print(found.section[0].robot.labels[0], "held:", len(found.section[0].cusps), "cusps")

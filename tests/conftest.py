@@ -32,7 +32,7 @@ def robots_observed_once() -> None:
 
 @pytest.fixture(autouse=True)
 def nothing_answered_before():
-    from hrsynth.analysis.question import forget_answers
+    from hrsynth.analysis.analysis_declaration import forget_answers
 
     forget_answers()
 

@@ -18,8 +18,8 @@ from description.samples import FOUR_BAR
 from description.test_defects import DEFECTS, edited
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.cli import execute
-from hrsynth.cli.questions import QUESTIONS
-from hrsynth.description import shipped
+from hrsynth.cli.analyses import QUESTIONS
+from hrsynth.description import list_robots
 from hrsynth.errors import BadRequest
 from hrsynth.present.outputs import OUTPUTS
 
@@ -30,23 +30,23 @@ FIELDS = {
         "dof",
         "mobility",
         "verdict",
-        "lost",
+        "unobserved",
         "unchecked_form",
         "steps",
-        "certificate",
+        "equivalence",
         "hidden_file",
         "report_file",
         "architecture",
     },
     "legs": {"sets", "minimal"},
-    "advise": {"verdict", "rank", "dof", "lost", "nothing_missing", "sets", "size", "tried", "complete"},
-    "branch": {"motors", "passive", "held", "box", "tried", "parts"},
+    "advise": {"verdict", "rank", "dof", "unobserved", "nothing_missing", "sets", "size", "tried", "complete"},
+    "branch": {"motors", "passive", "fixed", "box", "tried", "parts"},
     "check": {"characteristic_length", "observed", "camera", "configurations", "redundant", "grid"},
-    "singular": {
+    "singularities": {
         "measured",
         "dof",
         "verdict",
-        "lost",
+        "unobserved",
         "always",
         "never",
         "unexamined",
@@ -69,8 +69,8 @@ FIELDS = {
         "proof",
         "modes",
         "near_modes",
-        "degenerate",
-        "continuum",
+        "singular_solutions",
+        "continuous_family",
     },
     "path": {"verdict", "certified", "path", "margin", "boxes", "start", "goal", "reason", "value", "point"},
     "servo": {
@@ -80,7 +80,7 @@ FIELDS = {
         "gain",
         "sense",
         "noise",
-        "ended",
+        "outcome",
         "reason",
         "pose",
         "matched_mode",
@@ -197,12 +197,12 @@ def test_derive_json_is_the_contract_whatever_the_verdict(run, name: str, observ
     assert data["notation"].keys() == {"real", "hidden", "real_ascii", "hidden_ascii", "hidden_latex"}
     assert {"total", "idle", "as_written"} <= data["mobility"].keys()
     assert data["architecture"].keys() >= {"verdict", "exact"}
-    assert data["certificate"].keys() >= {"samples", "largest_angle", "smallest_gap", "passed"}
-    assert data["certificate"]["passed"] is True
+    assert data["equivalence"].keys() >= {"samples", "largest_angle", "smallest_gap", "passed"}
+    assert data["equivalence"]["passed"] is True
     assert data["steps"]
     assert all(step.keys() >= {"rule", "leg", "accepted", "reason", "largest_angle"} for step in data["steps"])
-    assert bool(data["lost"]) is (verdict != "controllable")
-    assert all(len(lost["twist"]) == 6 and lost["name"] for lost in data["lost"])
+    assert bool(data["unobserved"]) is (verdict != "controllable")
+    assert all(len(lost["twist"]) == 6 and lost["name"] for lost in data["unobserved"])
     assert all(one.keys() == {"leg", "link", "kind", "camera", "at", "axis"} for one in data["observed"])
     blind = verdict == "uncontrollable"
     assert (data["notation"]["hidden"] is None) is blind
@@ -257,7 +257,7 @@ WRITERS = {
     "check": ["--grid", "x=0:0.1:2"],
     "path": ["--start", "x=0", "--goal", "x=0"],
     "servo": ["--start", "x=0", "--goal", "x=0"],
-    "endings": ["--at", "x=0"],
+    "equilibria": ["--at", "x=0"],
     "basins": ["--to", "x=0"],
 }
 OTHERS = (
@@ -289,7 +289,7 @@ def test_a_file_that_cannot_be_written_is_told_before_any_work(
         pytest.fail("the work began")
 
     for module, work in (
-        ("cli.questions", "robot_of"),
+        ("cli.analyses", "robot_of"),
         ("cli.files", "robot_of"),
         ("cli.importing", "_read"),
         ("cli.catalog", "_of_word"),
@@ -365,7 +365,7 @@ def test_observe_takes_labels_links_duplicates_and_spaces(run):
 def test_both_forms_are_certified(run):
     data = run("derive", "3rrr_m1", "--form", "general", "--json").data
     assert data["form"] == "general"
-    assert data["certificate"]["passed"] is True
+    assert data["equivalence"]["passed"] is True
 
 
 @pytest.mark.parametrize(
@@ -436,7 +436,7 @@ def test_a_hidden_robot_of_one_leg_is_a_robot_again(run, tmp_path: Path, robot: 
     for later in (second, third):
         for told in ("dof", "verdict", "rank", "point_platform"):
             assert later[told] == data[told]
-        for once, again in zip(data["lost"], later["lost"], strict=True):
+        for once, again in zip(data["unobserved"], later["unobserved"], strict=True):
             assert again["twist"] == pytest.approx(once["twist"], abs=1e-9)
 
 
@@ -508,9 +508,9 @@ def test_check_json_is_the_contract(run):
     assert second["pose"]["x"] == pytest.approx(0, abs=1e-8)
     assert first["pose"]["rpy"] == pytest.approx([0, 0, 0], abs=1e-8)
     assert first["mobility"] == {"total": 9, "idle": 6}
-    assert (first["dof"], first["rank_M"]) == (3, 3)
+    assert (first["dof"], first["rank"]) == (3, 3)
     assert first["type1"] is first["type2"] is first["type3"] is False
-    assert first["classes"] == {"RI": 0, "RO": 0, "II": 0, "IO": 0, "RPM": 0, "IIM": 0}
+    assert first["singularity_indices"] == {"RI": 0, "RO": 0, "II": 0, "IO": 0, "RPM": 0, "IIM": 0}
     assert first["real"].keys() == {"rank", "gap", "type1", "type2", "type3", "classes", "lost"}
     assert first["constraint"] == {"singular": False, "rank_lost": 0, "gained": []}
     assert first["distances"].keys() == {
@@ -628,7 +628,7 @@ def test_check_without_an_interaction_matrix_draws_nothing(run, tmp_path: Path):
 
 
 def test_check_answers_3_where_a_rank_is_not_clear(run, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("hrsynth.analysis.posture.RANK_GAP", 1e30)
+    monkeypatch.setattr("hrsynth.analysis.configuration_report.RANK_GAP", 1e30)
     asked = run("check", "3rrr_m1", "--at", "x=0.01")
     assert asked.status == 3
     assert "not decided (smallest rank gap" in asked.out
@@ -657,7 +657,7 @@ def test_advise_json_is_the_contract(run):
     data = run("advise", "uranesx", "--json").data
     check_record(data, "advise", "uranesx")
     assert (data["verdict"], data["rank"], data["dof"]) == ("partially controllable", 2, 3)
-    assert [lost["name"] for lost in data["lost"]] == ["translation along z"]
+    assert [lost["name"] for lost in data["unobserved"]] == ["translation along z"]
     assert (data["nothing_missing"], data["size"], data["complete"]) == (False, 1, True)
     assert len(data["sets"]) == 6
     for each in data["sets"]:
@@ -769,8 +769,8 @@ def test_advise_refuses_what_does_not_fit(run, arguments: list[str], words: list
 
 
 def test_singular_json_is_the_contract(run):
-    data = run("singular", "quattro_rigid", "--observe", "1,3", "--points", "40", "--json").data
-    check_record(data, "singular", "quattro_rigid")
+    data = run("singularities", "quattro_rigid", "--observe", "1,3", "--points", "40", "--json").data
+    check_record(data, "singularities", "quattro_rigid")
     assert data["always"] is False
     assert data["words"] == "the tangents τ1, τ3 are parallel"
     assert data["expression"] == "det(n, tau1, tau3)"
@@ -781,17 +781,17 @@ def test_singular_json_is_the_contract(run):
 
 
 def test_singular_json_has_singular_poses(run):
-    examples = run("singular", "rrrrr_m1", "--points", "100", "--json").data["examples"]
+    examples = run("singularities", "rrrrr_m1", "--points", "100", "--json").data["examples"]
     assert examples
     for each in examples:
         assert each["pose"].keys() >= {"x", "y", "z"}
         assert each["singular_value"] < 1e-9 < 1e-3 < each["singular_value_nearby"]
-        assert [lost["name"][:12] for lost in each["lost"]] == ["translation "]
+        assert [lost["name"][:12] for lost in each["unobserved"]] == ["translation "]
 
 
 def test_singular_json_where_a_freedom_is_always_lost(run):
-    data = run("singular", "uranesx", "--json").data
-    check_record(data, "singular", "uranesx")
+    data = run("singularities", "uranesx", "--json").data
+    check_record(data, "singularities", "uranesx")
     assert data["always"] is True
     assert data["words"].startswith("always: 1 of 3 freedoms is never seen: translation along z")
     assert (data["expression"], data["verdict"]) == ("0", "partially controllable")
@@ -799,13 +799,13 @@ def test_singular_json_where_a_freedom_is_always_lost(run):
 
 
 def test_singular_of_the_real_robot(run):
-    data = run("singular", "rrrrr_m1", "--real", "--points", "30", "--json").data
+    data = run("singularities", "rrrrr_m1", "--real", "--points", "30", "--json").data
     assert data["measured"]["kind"] == "motors"
     assert data["words"] == "the line B1B2 is normal to τ2"
 
 
 def test_singular_text(run):
-    answer = run("singular", "rrrrr_m1", "--points", "100")
+    answer = run("singularities", "rrrrr_m1", "--points", "100")
     assert (answer.status, answer.err) == (0, "")
     for line in (
         r"^Type 2 +the tangents τ1, τ2 are parallel$",
@@ -820,7 +820,7 @@ def test_singular_text(run):
 def test_singular_draws_the_locus(run, tmp_path: Path):
     picture = tmp_path / "locus.png"
     data = run(
-        "singular", "3rrr_m1", "--points", "30", "--plane", "phi=0", "--steps", "9", "-o", picture, "--json"
+        "singularities", "3rrr_m1", "--points", "30", "--plane", "phi=0", "--steps", "9", "-o", picture, "--json"
     ).data
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert data["file"] == str(picture)
@@ -853,7 +853,7 @@ def test_singular_refuses_in_one_line_and_writes_nothing(
     words: list[str],
 ):
     monkeypatch.chdir(tmp_path)
-    (line,) = run("singular", robot, "--points", "5", *arguments).refused(status)
+    (line,) = run("singularities", robot, "--points", "5", *arguments).refused(status)
     assert all(word in line for word in words), line
     assert list(tmp_path.iterdir()) == []
 
@@ -874,13 +874,15 @@ def test_singular_refuses_in_one_line_and_writes_nothing(
 def test_singular_refuses_a_plane_before_it_computes(
     run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], status: int, words: list[str]
 ):
-    monkeypatch.setattr(hrsynth, "singular", lambda *_, **__: pytest.fail("computed before the plane was looked at"))
-    (line,) = run("singular", "3rrr_m1", *arguments, "-o", tmp_path / "x.png").refused(status)
+    monkeypatch.setattr(
+        hrsynth, "singularities", lambda *_, **__: pytest.fail("computed before the plane was looked at")
+    )
+    (line,) = run("singularities", "3rrr_m1", *arguments, "-o", tmp_path / "x.png").refused(status)
     assert all(word in line for word in words), line
 
 
 @pytest.mark.parametrize(
-    "words", [["singular", "-o", "x.png"], ["accuracy", "--cone", "1deg", "--plane", "y=0"]], ids=" ".join
+    "words", [["singularities", "-o", "x.png"], ["accuracy", "--cone", "1deg", "--plane", "y=0"]], ids=" ".join
 )
 def test_a_robot_of_one_freedom_has_no_plane(
     run, robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str]
@@ -894,9 +896,9 @@ def test_a_robot_of_one_freedom_has_no_plane(
 
 @pytest.mark.slow
 def test_singular_answers_3_where_condition_and_rank_disagree(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("hrsynth.analysis.singularity.agreement.RANK_CUTOFF", 1e-30)
+    monkeypatch.setattr("hrsynth.analysis.singularity.condition_check.RANK_CUTOFF", 1e-30)
     picture = tmp_path / "locus.png"
-    (line,) = run("singular", "rrrrr_m1", "--points", "100", "--steps", "5", "-o", picture).refused(3)
+    (line,) = run("singularities", "rrrrr_m1", "--points", "100", "--steps", "5", "-o", picture).refused(3)
     assert "the condition and the rank disagree" in line
     assert not picture.exists()
 
@@ -996,7 +998,7 @@ def test_modes_json_is_the_contract(run, arguments: list[str], count: int, real:
 
 def test_modes_of_too_few_legs_are_a_continuum(run, tmp_path: Path):
     data = run("modes", "delta", "--observe", "1", "--json").data
-    assert (data["continuum"], data["modes"], data["complete"], data["complex"]) == (1, [], False, None)
+    assert (data["continuous_family"], data["modes"], data["complete"], data["complex"]) == (1, [], False, None)
     picture = tmp_path / "modes.png"
     answer = run("modes", "delta", "--observe", "1", "-o", picture)
     assert answer.status == 0
@@ -1036,7 +1038,7 @@ def test_servo_json_is_the_contract(run, tmp_path: Path):
     picture = tmp_path / "run.png"
     data = run("servo", "rrrrr_m1", "--start", "x=0,y=0.2", "--goal", "x=0.02,y=0.22", "-o", picture, "--json").data
     check_record(data, "servo", "rrrrr_m1")
-    assert (data["ended"], data["matched_mode"], data["noise"]) == ("goal", None, None)
+    assert (data["outcome"], data["matched_mode"], data["noise"]) == ("goal", None, None)
     assert data["pose"]["x"] == pytest.approx(0.02, abs=1e-8)
     assert len(data["times"]) == len(data["poses"]) == len(data["error"])
     assert all(len(errors) == len(data["observed"]) for errors in data["error"])
@@ -1103,7 +1105,7 @@ def test_servo_refuses_what_does_not_fit(run, arguments: list[str], words: list[
         ["accuracy", "--cone", "1deg", "--grid", "x=8:9:2,y=0,z=-0.6"],
         ["accuracy", "--cone", "1deg", "--plane", "z=9"],
         ["select", "--start", "x=0", "--goal", "x=9"],
-        ["singular", "--points", "5", "--plane", "z=9", "-o", "locus.png"],
+        ["singularities", "--points", "5", "--plane", "z=9", "-o", "locus.png"],
     ],
     ids=" ".join,
 )
@@ -1141,7 +1143,7 @@ def test_legs_json(run):
 def test_robots_json_names_every_file(run):
     data = run("robots", "--json").data
     check_record(data, "robots", None)
-    assert [one["name"] for one in data["robots"]] == list(shipped())
+    assert [one["name"] for one in data["robots"]] == list(list_robots())
     assert all(Path(one["file"]).is_file() for one in data["robots"])
     text = run("robots").out
     for one in data["robots"]:
@@ -1157,7 +1159,7 @@ def test_convert_is_stable(run, tmp_path: Path, name: str):
     check_record(data, "convert", name)
     assert data["file"] == str(first)
     assert run("convert", first, second).status == 0
-    assert first.read_bytes() == second.read_bytes() == shipped()[name].read_bytes()
+    assert first.read_bytes() == second.read_bytes() == list_robots()[name].read_bytes()
 
 
 def test_nothing_is_written_over_the_file_that_is_read(run, robot):
@@ -1238,7 +1240,7 @@ def test_a_loop_that_cannot_be_closed_is_named_with_its_residual(run, robot):
 
 def with_observes(*observes: tuple[str, str]) -> tuple[str, int]:
     """A shipped robot with these (leg, link) observed, one a line; the line of the last."""
-    text = shipped()["delta"].read_text(encoding="utf-8")
+    text = list_robots()["delta"].read_text(encoding="utf-8")
     place = text.index("<platform")
     lines = [f'<observe leg="{leg}" link="{link}" axis="0 0 1"/>\n' for leg, link in observes]
     return text[:place] + "\n" + "".join(lines) + text[place:], text.count("\n", 0, place) + 1 + len(lines)

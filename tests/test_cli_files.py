@@ -23,12 +23,12 @@ GRID = ["--grid", "x=0:0.02:2,y=0.2:0.24:2"]
 DRAWN = {
     "check": ["check", "rrrrr_m1", *GRID],
     "modes": ["modes", "3rrr_m1"],
-    "atlas": ["atlas", "3rrr_m1", "--observe", "2,1,3"],
+    "aspects": ["aspects", "3rrr_m1", "--observe", "2,1,3"],
     "accuracy": ["accuracy", "rrrrr_m1", "--cone", "0.1deg", *GRID],
-    "endings": ["endings", "prrrp_m1", "--at", "mode:1"],
+    "equilibria": ["equilibria", "prrrp_m1", "--at", "mode:1"],
     "basins": ["basins", "rrrrr_m1", "--to", "x=0.02,y=0.24", "--grid", "x=0.01:0.02:2,y=0.24", "--jobs", "1"],
     "servo": ["servo", "rrrrr_m1", "--start", "x=0,y=0.2", "--goal", "x=0.02,y=0.22"],
-    "singular": ["singular", "rrrrr_m1", "--points", "5", "--steps", "5"],
+    "singularities": ["singularities", "rrrrr_m1", "--points", "5", "--steps", "5"],
 }
 FILES = {
     **{name: [([*asked, "-o", f"{name}.svg"], [f"{name}.svg"])] for name, asked in DRAWN.items()},
@@ -71,7 +71,7 @@ def test_one_sentence_names_what_is_written(here: Path, capsys, arguments: list[
 
 @pytest.mark.some(1, 3)
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in ("singular", "endings"))) for name in DRAWN]
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in ("singularities", "equilibria"))) for name in DRAWN]
 )
 def test_figures_are_written_as_wide_as_asked(here: Path, capsys, name: str):
     widths = {"120mm": 120 / 25.4, "11.5cm": 11.5 / 2.54, "4.5in": 4.5}
@@ -115,8 +115,8 @@ def test_maps_show_the_robot_to_scale(here: Path):
     from hrsynth.present.maps import MapPlane
 
     found = hrsynth.check("rrrrr_m1", grid="x=0:0.02:2,y=0.2:0.22:2")
-    start = found.setting.everything.start
-    plane = MapPlane.of(found.grid.grid.axes, found.setting.motion, 0.3, 2.0)
+    start = found.setup.all_samples.start
+    plane = MapPlane.of(found.grid.grid.axes, found.setup.motion, 0.3, 2.0)
     figure = Figure()
     place = figure.subplots()
     (entry,) = plane.robot(figure, start)
@@ -124,12 +124,12 @@ def test_maps_show_the_robot_to_scale(here: Path):
     points = {
         (round(float(x), 6), round(float(y), 6)) for path in strokes.get_paths() for x, y in np.asarray(path.vertices)
     }
-    mechanism = start.twin.mechanism
+    mechanism = start.model.mechanism
     centres = {(round(float(p[0]), 6), round(float(p[1]), 6)) for p in (j.point for j in mechanism.joints.values())}
     assert points == centres
     assert entry.get_label() == "robot at its zero pose"
     assert not MapPlane.of(
-        (("x", found.grid.grid.axes[0][1]), ("phi", found.grid.grid.axes[0][1])), found.setting.motion, 0.3, 2.0
+        (("x", found.grid.grid.axes[0][1]), ("phi", found.grid.grid.axes[0][1])), found.setup.motion, 0.3, 2.0
     ).robot(figure, start)
 
 
@@ -143,16 +143,16 @@ def test_a_robot_without_strokes_is_not_in_the_legend(tmp_path: Path):
     file = tmp_path / "free.urdf"
     file.write_text("""<robot name="free"><link name="world"/><link name="body"/>
       <joint name="free" type="floating"><parent link="world"/><child link="body"/></joint></robot>""")
-    setting = hrsynth.observe(
+    setup = hrsynth.observe(
         hrsynth.load(file),
         camera="eye=body",
         see=[f"point:world@{at}" for at in ("0.3,0,1", "-0.15,0.25,1", "-0.15,-0.25,1")],
     )
     values = np.array([0.0, 1.0])
-    plane = MapPlane.of((("x", values), ("y", values)), setting.motion, 0.3, 2.0)
+    plane = MapPlane.of((("x", values), ("y", values)), setup.motion, 0.3, 2.0)
     figure = Figure()
     place = figure.subplots()
-    assert not plane.robot(figure, setting.everything.start)
+    assert not plane.robot(figure, setup.all_samples.start)
     assert not place.collections
 
 

@@ -12,7 +12,7 @@ from description.foreign.test_dialects import written
 from description.foreign.test_traps import bars, origin
 from hrsynth.cli import execute
 
-COMMANDS = ("derive", "legs", "check", "singular", "advise", "modes", "path", "convert")
+COMMANDS = ("derive", "legs", "check", "singularities", "advise", "modes", "path", "convert")
 
 
 @pytest.fixture

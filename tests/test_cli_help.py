@@ -18,9 +18,9 @@ import pytest
 
 import hrsynth
 from hrsynth.cli import app, execute
+from hrsynth.cli.analyses import QUESTIONS
 from hrsynth.cli.completion import candidates
-from hrsynth.cli.questions import QUESTIONS
-from hrsynth.description import shipped
+from hrsynth.description import list_robots
 from hrsynth.options import OUTPUT, READING, WATCHING
 
 ROOT: Any = app
@@ -71,7 +71,7 @@ def test_summaries_are_whole_at_any_width(capsys, monkeypatch: pytest.MonkeyPatc
     assert shown == " ".join(called(capsys).split())
 
 
-LONGEST = {("select", "quattro"), ("basins", "quattro"), ("endings", "quattro")}
+LONGEST = {("select", "quattro"), ("basins", "quattro"), ("equilibria", "quattro")}
 """Examples that take a minute; the first notebooks, the pages and smaller robots ask the same."""
 
 
@@ -247,7 +247,7 @@ def test_completion_knows_commands_options_and_words(typed: list[str], expected:
 
 
 def test_completion_knows_robots_and_every_option():
-    assert candidates(ROOT, ["derive", ""]) == candidates(ROOT, ["lint", "a.urdf", ""]) == list(shipped())
+    assert candidates(ROOT, ["derive", ""]) == candidates(ROOT, ["lint", "a.urdf", ""]) == list(list_robots())
     for path in LEAVES:
         offered = candidates(ROOT, [*path, "--"])
         known = {part for each in command(path).options for name in each.names for part in name.split("/")}
@@ -255,7 +255,7 @@ def test_completion_knows_robots_and_every_option():
 
 
 def test_completion_knows_the_examples_once_they_are_begun():
-    known = [f"example:{name}" for name in hrsynth.examples()]
+    known = [f"example:{name}" for name in hrsynth.list_examples()]
     assert candidates(ROOT, ["derive", "exa"]) == candidates(ROOT, ["verify", "c.json", "--robot", "example:"]) == known
     assert candidates(ROOT, ["derive", "example:cassie"])[0].startswith("example:cassie")
 

@@ -28,7 +28,7 @@ QUICK = {
         "i4l",
         "rrrrr_m1 --at x=0,y=0.3332050807568877 --grid x=-0.4:0.4:3,y=0.25:0.41:3 -o map.csv",
     ],
-    "singular": ["rrrrr_m1 --points 30", "uranesx --points 5", "hexaglide --points 5"],
+    "singularities": ["rrrrr_m1 --points 30", "uranesx --points 5", "hexaglide --points 5"],
     "advise": ["uranesx", "quattro --observe 1,4", "gough_stewart --observe 1", "i4l --observe 1,2"],
     "branch": ["rrrrr_m1 --box shoulder_1=-0.05:0.05,shoulder_2=-0.05:0.05"],
     "modes": [
@@ -38,9 +38,9 @@ QUICK = {
         "quattro --observe 1,3 --at x=0.05,y=0.1,z=-0.7,phi=10deg",
         "3rrr_m1 --real --at x=0.02,phi=5deg",
     ],
-    "atlas": ["3rrr_m1 --observe 2,1,3"],
+    "aspects": ["3rrr_m1 --observe 2,1,3"],
     "path": ["quattro --observe 1,4 --start x=0.05 --goal x=-0.05,phi=20deg", "3rps --start z=0.5 --goal z=0.51"],
-    "endings": ["rrrrr_m1 --at x=0,y=0.2", "rprpr_m1 --at x=0 --complete"],
+    "equilibria": ["rrrrr_m1 --at x=0,y=0.2", "rprpr_m1 --at x=0 --complete"],
     "servo": [
         "rrrrr_m1 --start x=0,y=0.2 --goal x=0.02,y=0.22",
         "rrrrr_m1 --start x=0,y=0.2 --goal x=0.02,y=0.22 --noise 0.1deg --time 3",

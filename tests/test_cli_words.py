@@ -11,7 +11,7 @@ import pytest
 
 import hrsynth
 from hrsynth.cli import execute
-from hrsynth.description import shipped
+from hrsynth.description import list_robots
 from hrsynth.geometry.vectors import orient_axis
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism.normal import normal_form
@@ -54,7 +54,7 @@ def test_a_turn_about_one_axis_is_told_in_one_way_however_it_was_typed(
     assert re.search(rf"\bphi={re.escape(told)}deg\b", text)
 
 
-@pytest.mark.parametrize("command", ["modes", "atlas"])
+@pytest.mark.parametrize("command", ["modes", "aspects"])
 def test_what_is_held_is_called_what_it_is(printed, command: str):
     assert "held      what is observed at" in printed(f"{command} 3rpr_m1 --see encoder:slide_1")
     assert "held      the observed directions at" in printed(f"{command} 3rpr_m1")
@@ -87,7 +87,7 @@ def test_a_turn_that_is_not_phi_is_told_by_rpy():
     assert str(found.postures[1].pose).endswith("rpy=10deg/5deg/0deg")
 
 
-@pytest.mark.parametrize("name", list(shipped()))
+@pytest.mark.parametrize("name", list(list_robots()))
 def test_loops_are_named_as_in_the_file(name: str):
     robot = hrsynth.load(name)
     written = [joint.name for joint in robot.joints.values() if not joint.in_tree]
@@ -226,7 +226,11 @@ def test_a_turn_of_more_than_half_a_circle_without_a_unit_is_told_in_degrees(
 
 @pytest.mark.parametrize(
     ("command", "usual"),
-    [("basins 3rrr_m1 --goal x=0", "--to"), ("endings 3rrr_m1 --to x=0", "--at"), ("path 3rrr_m1 --at x=0", "--goal")],
+    [
+        ("basins 3rrr_m1 --goal x=0", "--to"),
+        ("equilibria 3rrr_m1 --to x=0", "--at"),
+        ("path 3rrr_m1 --at x=0", "--goal"),
+    ],
 )
 def test_the_pose_of_a_question_is_named_where_another_name_is_given(
     command: str, usual: str, capsys: pytest.CaptureFixture[str]

@@ -15,20 +15,20 @@ import pytest
 
 from hrsynth.analysis import check as checks
 from hrsynth.analysis.accuracy import accuracy as accuracies
-from hrsynth.analysis.accuracy.cones import Blur
-from hrsynth.analysis.aspects.path import Aspects
+from hrsynth.analysis.accuracy.measurement_bounds import MeasurementBounds
+from hrsynth.analysis.aspects.path import PathPlanner
 from hrsynth.analysis.modes.modes import modes
 from hrsynth.analysis.observed import ObservedRobot, motors
-from hrsynth.analysis.singularity.agreement import weakest
+from hrsynth.analysis.singularity.condition_check import weakest
 from hrsynth.analysis.singularity.locus import locus
 from hrsynth.batch.iterative_leg import IterativeLeg
-from hrsynth.batch.reach import reach
+from hrsynth.batch.pose_continuation import reach
 from hrsynth.description import load
-from hrsynth.errors import BadRequest, PlaneNotMet, PoseNotReached
+from hrsynth.errors import BadRequest, NoReachablePose, PoseNotReached
 from hrsynth.geometry.vectors import Array, rotation_from_rpy
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.steps import track
-from hrsynth.kinematics.tasks import Target
+from hrsynth.kinematics.continuation import track
+from hrsynth.kinematics.tasks import PoseAndValuesTask
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.observations.encoder import AngleEncoder
 from hrsynth.mechanism.pose import Grid, Pose
@@ -74,8 +74,8 @@ class Case:
         return sampled(self.robot, self.observe)
 
     @cached_property
-    def aspects(self) -> Aspects:
-        return Aspects.of(self.setting)
+    def aspects(self) -> PathPlanner:
+        return PathPlanner.of(self.setting)
 
 
 @cache
@@ -88,16 +88,16 @@ def half_turn(axis: Array) -> Array:
     return 2 * np.outer(axis, axis) - np.eye(3)
 
 
-def wanted_poses(setting: ObservedRobot, count: int, seed: int) -> Iterator[tuple[Array, Pose]]:
+def wanted_poses(setup: ObservedRobot, count: int, seed: int) -> Iterator[tuple[Array, Pose]]:
     """Poses (4, 4) near home turned by half a turn about random axes, at first the coordinate axes; as matrices and
     as a user writes them."""
-    rng, motion = np.random.default_rng(seed), setting.motion
+    rng, motion = np.random.default_rng(seed), setup.motion
     for number in range(count):
         axis = np.eye(3)[number] if number < 3 and not seed else random_direction(rng)
         if motion.rotations.shape[1] == 1:
             axis = motion.rotations[:, 0]
         along = motion.translations
-        shift = 0.1 * setting.everything.twin.length * along @ rng.uniform(-1, 1, along.shape[1])
+        shift = 0.1 * setup.all_samples.model.length * along @ rng.uniform(-1, 1, along.shape[1])
         X = motion.home.copy()
         X[:3, :3] = half_turn(axis) @ X[:3, :3]
         X[:3, 3] = motion.position(motion.home) + shift - X[:3, :3] @ motion.point
@@ -111,25 +111,25 @@ def rotation(pose: Pose) -> Array:
     return rotation_from_rpy(*pose.rpy)
 
 
-def assert_there(setting: ObservedRobot, at: ClosedConfiguration, X: Array) -> None:
+def assert_there(setup: ObservedRobot, at: ClosedConfiguration, X: Array) -> None:
     """By the poses of all links: the platform is at X, all loops are closed."""
-    assert np.abs(at.pose(setting.motion.link) - X).max() < NEAR
-    assert Oracle(at.twin.mechanism).error(state_of(at.twin, at.q)) < NEAR
+    assert np.abs(at.pose(setup.motion.link) - X).max() < NEAR
+    assert Oracle(at.model.mechanism).error(state_of(at.model, at.q)) < NEAR
 
 
 Answer = Sequence[ClosedConfiguration]
 
 
 def reached(case: Case, pose: Pose) -> Answer:
-    everything = case.setting.everything
-    return [reach(everything.start, everything.question, pose, case.setting.motion)]
+    all_samples = case.setting.all_samples
+    return [reach(all_samples.start, all_samples.observation_model, pose, case.setting.motion)]
 
 
 def led_whole(case: Case, pose: Pose) -> Answer:
     """Led to the whole pose, as trajectories are."""
     X = np.eye(4)
     X[:3, :3], X[:3, 3] = pose.rotation, [pose.x, pose.y, pose.z]
-    at, came = track(case.setting.everything.start, case.setting.motion, case.setting.motion.whole(X))
+    at, came = track(case.setting.all_samples.start, case.setting.motion, case.setting.motion.whole(X))
     if came < 1:
         raise PoseNotReached(case.robot.name, str(pose), came, "")
     return [at]
@@ -143,7 +143,7 @@ def beside(case: Case, pose: Pose) -> Grid:
     """The grid of the pose and another beside it."""
     part = case.setting.motion.parts[0]
     start = getattr(pose, part)
-    ends = np.array([start, start + 0.01 * case.setting.everything.twin.length])
+    ends = np.array([start, start + 0.01 * case.setting.all_samples.model.length])
     return Grid(((part, ends),), replace(pose, **{part: None}))
 
 
@@ -153,19 +153,19 @@ def swept(case: Case, pose: Pose) -> Answer:
     cells = checks.check(case.robot, case.observe, grid=grid).grid
     assert cells is not None
     if cells.postures[0] is None:
-        raise PlaneNotMet(case.robot.name, str(grid), "")
+        raise NoReachablePose(case.robot.name, str(grid), "")
     return [cells.postures[0].configuration]
 
 
 def moded(case: Case, pose: Pose) -> Answer:
     found = modes(case.setting, at=pose)
-    assert found.found.continuum or sum(mode.goal for mode in found.modes) == 1
+    assert found.found.continuous_family or sum(mode.goal for mode in found.modes) == 1
     return [found.goal, *(mode.configuration for mode in found.modes if mode.goal and mode.configuration is not None)]
 
 
 def pathed(case: Case, pose: Pose) -> Answer:
     (at,) = reached(case, pose)
-    answer = case.aspects.join(case.setting.everything.start, at, budget=20)
+    answer = case.aspects.join(case.setting.all_samples.start, at, budget=20)
     assert answer.poses[-1] == answer.goal.pose
     return [answer.goal.configuration]
 
@@ -182,7 +182,7 @@ def mapped(case: Case, pose: Pose) -> Answer:
     field = accuracies.accuracy(case.robot, case.observe, cone=1e-3, grid=grid).field
     assert field is not None
     if field.reached[0]:
-        single = accuracies.errors_at(case.setting, Blur(np.full(len(case.setting.observed), 1e-3)), at[0])
+        single = accuracies.errors_at(case.setting, MeasurementBounds(np.full(len(case.setting.observed), 1e-3)), at[0])
         assert field.position[0] == pytest.approx(single.position.largest, rel=1e-2)
     return at
 
@@ -195,14 +195,14 @@ def located(case: Case, pose: Pose) -> Answer:
     (there,) = found.grid.poses_at([tuple(map(int, cell))])
     assert there.rpy == plane.rpy
     (at,) = reached(case, there)
-    assert found.hidden.type2[cell] == pytest.approx(weakest(at, case.setting.samples.question), rel=1e-6)
+    assert found.hidden.type2[cell] == pytest.approx(weakest(at, case.setting.samples.observation_model), rel=1e-6)
     return reached(case, pose)
 
 
 def served(case: Case, pose: Pose) -> Answer:
     """A run is told to have ended at the goal only at the goal."""
     found = servo(case.robot, case.observe, start=Pose(), goal=pose, time=0.3)
-    if found.ended == "goal":
+    if found.outcome == "goal":
         assert_there(case.setting, found.settled, found.target.pose(case.setting.motion.link))
     else:
         assert found.from_goal[1] > 1e-6
@@ -227,7 +227,7 @@ def answers(robot: str, command: str, count: int, seed: int) -> Counter[str]:
     for X, pose in wanted_poses(case.setting, count, seed):
         try:
             found = (COMMANDS | SLOW)[command](case, pose)
-        except (PoseNotReached, PlaneNotMet, BadRequest) as error:
+        except (PoseNotReached, NoReachablePose, BadRequest) as error:
             told[type(error).__name__] += len(error.lines())
             continue
         for at in found:
@@ -239,27 +239,27 @@ def answers(robot: str, command: str, count: int, seed: int) -> Counter[str]:
 def test_a_motor_at_half_a_turn_is_held_from_either_side() -> None:
     """Its angle is π and −π there; the way to it is as short from both sides."""
     case = case_of("3rrr_m1")
-    setting, twin = case.setting, case.setting.everything.twin
-    (encoder, *_) = motors(setting).observations
+    setup, model = case.setting, case.setting.all_samples.model
+    (encoder, *_) = motors(setup).observations
     assert isinstance(encoder, AngleEncoder)
-    bare = Target(setting.motion.link, np.eye(4), np.zeros(3), setting.mechanism.reference, ())
-    (crank,) = twin.coordinates[encoder.joint]
+    bare = PoseAndValuesTask(setup.motion.link, np.eye(4), np.zeros(3), setup.mechanism.reference, ())
+    (crank,) = model.coordinates[encoder.joint]
     for angle in (np.pi, -np.pi):
         for side in (1e-2, -1e-2):
-            q = twin.q0.copy()
-            q[twin.model.joints[twin.model.getJointId(encoder.joint)].idx_q] = angle + side
-            error, rows = replace(bare, measured=((encoder, np.array([angle])),)).rows(twin, q)
+            q = model.q0.copy()
+            q[model.model.joints[model.model.getJointId(encoder.joint)].idx_q] = angle + side
+            error, rows = replace(bare, measured=((encoder, np.array([angle])),)).error_and_jacobian(model, q)
             assert error[-1] == pytest.approx(side, abs=1e-12)
             assert rows[-1, crank] == pytest.approx(1)
 
 
 def test_a_link_that_has_turned_over_does_not_close_its_leg() -> None:
     """Half a turn about the line through its two joints keeps the joints' centres and leaves their axes parallel."""
-    setting = case_of("3rrr_m1").setting
-    leg, seen = setting.anatomy.legs[0], setting.segments[0]
-    chain = IterativeLeg.of(setting.mechanism, leg, seen, None)
+    setup = case_of("3rrr_m1").setting
+    leg, seen = setup.decomposition.legs[0], setup.segments[0]
+    chain = IterativeLeg.of(setup.mechanism, leg, seen, None)
     place = chain.links.index(seen.link)
-    one, two = (joint.point / chain.length for joint in setting.mechanism.joints_of(seen.link))
+    one, two = (joint.point / chain.length for joint in setup.mechanism.joints_of(seen.link))
     state = chain.start(1)
     ends = state[:, 1].copy()
     assert chain.close(state, ends, 1)[1] == pytest.approx([0], abs=1e-12)

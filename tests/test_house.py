@@ -240,7 +240,7 @@ BARE = {
     "ZERO",
 }
 """Names that tell no meaning."""
-MEASURED = {"simulation/mockup.py"}
+MEASURED = {"simulation/mujoco_model.py"}
 """Modules whose small numbers are quantities of a body, not tolerances."""
 SMALL = 1e-2
 """Below it a number is a tolerance."""

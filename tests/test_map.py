@@ -35,7 +35,7 @@ def same(one: object, other: object) -> bool:
 def test_answers_are_those_of_the_questions_one_by_one_in_their_order():
     expected = one_by_one()
     for jobs in (1, 2):
-        found = hrsynth.map(hrsynth.check, ROBOTS, legs=LEGS, poses=POSES, jobs=jobs, errors="keep")
+        found = hrsynth.map_robots(hrsynth.check, ROBOTS, legs=LEGS, poses=POSES, jobs=jobs, errors="keep")
         assert len(found) == len(expected) == 12
         assert all(map(same, found, expected)), jobs
         assert sum(isinstance(each, PoseNotReached) for each in found) == 2
@@ -45,7 +45,7 @@ def test_answers_are_those_of_the_questions_one_by_one_in_their_order():
 def test_an_error_ends_all_and_says_what_was_asked():
     for jobs in (1, 2):
         with pytest.raises(PoseNotReached) as caught:
-            hrsynth.map("check", ROBOTS, poses=POSES, jobs=jobs)
+            hrsynth.map_robots("check", ROBOTS, poses=POSES, jobs=jobs)
         (note,) = caught.value.__notes__
         assert note.startswith("asked: robot <Mechanism: 3rrr_m1")
         assert "at x=9,y=0,z=0" in note
@@ -55,29 +55,34 @@ def test_an_error_ends_all_and_says_what_was_asked():
 @pytest.mark.slow
 def test_a_defect_in_a_worker_is_told_with_what_was_asked():
     with pytest.raises(ZeroDivisionError) as caught:
-        hrsynth.map(lambda robot: 1 / 0, ["quattro"] * 3, jobs=2, errors="keep")
+        hrsynth.map_robots(lambda robot: 1 / 0, ["quattro"] * 3, jobs=2, errors="keep")
     assert "quattro" in caught.value.__notes__[0]
 
 
 def test_a_robot_that_cannot_be_read_is_an_error_in_the_place_of_its_answers():
     for question in ("derive", lambda robot, observe: robot.name):
         robots: list = ["rrrrr_m1", "nope", 5]
-        found = hrsynth.map(question, robots, legs=["1", "2"], jobs=1, errors="keep")
+        found = hrsynth.map_robots(question, robots, legs=["1", "2"], jobs=1, errors="keep")
         assert [isinstance(each, BadRequest) for each in found] == [False, False, True, True, True, True]
         assert [each.__notes__[0].startswith("asked: robot 'nope', observe") for each in found[2:4]] == [True, True]
     with pytest.raises(BadRequest, match="nope"):
-        hrsynth.map("derive", ["rrrrr_m1", "nope"], jobs=1)
+        hrsynth.map_robots("derive", ["rrrrr_m1", "nope"], jobs=1)
 
 
 def test_any_function_is_asked_and_any_question():
     robots = ["3rrr_m1", "3rpr_m1"]
-    assert hrsynth.map(lambda robot, observe: observe, robots, legs=[1, [2, 3]], jobs=2) == 2 * [("1",), ("2", "3")]
-    assert hrsynth.map(lambda robot, observe: observe, robots[0], legs="1,3", jobs=1) == [("1", "3")]
-    found = hrsynth.map("path", robots[:1], poses=[[0.01, 0, 0]], start="x=0,y=0,phi=0", jobs=1)
+    assert hrsynth.map_robots(lambda robot, observe: observe, robots, legs=[1, [2, 3]], jobs=2) == 2 * [
+        ("1",),
+        ("2", "3"),
+    ]
+    assert hrsynth.map_robots(lambda robot, observe: observe, robots[0], legs="1,3", jobs=1) == [("1", "3")]
+    found = hrsynth.map_robots("path", robots[:1], poses=[[0.01, 0, 0]], start="x=0,y=0,phi=0", jobs=1)
     assert found == [hrsynth.path("3rrr_m1", start="x=0,y=0,phi=0", goal="x=0.01,y=0,z=0")]
-    assert hrsynth.map("derive", "3rrr_m1", form="general", jobs=1) == [hrsynth.derive("3rrr_m1", form="general")]
-    assert hrsynth.map("derive", []) == []
-    assert hrsynth.map("check", robots, poses=[]) == []
+    assert hrsynth.map_robots("derive", "3rrr_m1", form="general", jobs=1) == [
+        hrsynth.derive("3rrr_m1", form="general")
+    ]
+    assert hrsynth.map_robots("derive", []) == []
+    assert hrsynth.map_robots("check", robots, poses=[]) == []
 
 
 @pytest.mark.parametrize(
@@ -98,7 +103,7 @@ def test_any_function_is_asked_and_any_question():
 )
 def test_what_cannot_be_asked_is_refused_before_the_work(question, robots, options, allowed):
     with pytest.raises(BadRequest, match=allowed):
-        hrsynth.map(question, robots, **options)
+        hrsynth.map_robots(question, robots, **options)
 
 
 @pytest.mark.slow
@@ -107,7 +112,7 @@ def test_a_script_needs_no_guard(tmp_path):
     script = tmp_path / "study.py"
     script.write_text(
         "import hrsynth\n"
-        "found = hrsynth.map('check', ['3rrr_m1', '3rpr_m1'], poses=[[0.01, 0, 0], [0, 0, 0]], jobs=2)\n"
+        "found = hrsynth.map_robots('check', ['3rrr_m1', '3rpr_m1'], poses=[[0.01, 0, 0], [0, 0, 0]], jobs=2)\n"
         "print(len(found), *(each.postures[0].hidden.state for each in found))\n"
     )
     run = subprocess.run(

@@ -64,7 +64,7 @@ def test_the_first_notebook_runs_as_a_script(monkeypatch: pytest.MonkeyPatch, ca
     names = runpy.run_path(str(FIRST))
     assert "ended: mode, mode 2" in capsys.readouterr().out
     assert len(names["found"].modes) == 2
-    assert names["hidden"].certificate.passed
+    assert names["hidden"].equivalence.passed
 
 
 @pytest.mark.slow

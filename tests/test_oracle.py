@@ -79,13 +79,13 @@ def freedoms(mechanism: Mechanism) -> Array:
     def slide(axis: Array) -> Array:
         return np.concatenate((axis, np.zeros(3)))
 
-    letter, axes, everything = joint.type.value, joint.axes, list(np.eye(3))
+    letter, axes, all_samples = joint.type.value, joint.axes, list(np.eye(3))
     if letter == "E":
         first = np.linalg.svd(joint.axis[None])[2][1:]
         twists = [turn(joint.axis), *map(slide, first)]
     else:
-        turns = {"R": axes, "C": axes, "U": axes, "S": everything, "6": everything}.get(letter, [])
-        slides = {"P": axes, "C": axes, "6": everything}.get(letter, [])
+        turns = {"R": axes, "C": axes, "U": axes, "S": all_samples, "6": all_samples}.get(letter, [])
+        slides = {"P": axes, "C": axes, "6": all_samples}.get(letter, [])
         twists = [*map(turn, turns), *map(slide, slides)]
     return np.array(twists).reshape(-1, 6).T
 
@@ -321,14 +321,14 @@ def test_the_same_robot_written_otherwise_is_assembled_at_the_same_directions(na
     other = real
     for _ in range(3):
         other = split(other, rng)
-    oracle, twin = Oracle(real), Oracle(other)
-    start = twin.zero()
+    oracle, model = Oracle(real), Oracle(other)
+    start = model.zero()
     for state in oracle.random_walk(rng, 3, 0.25):
-        start = twin.assemble(oracle.pose(state, "platform"), oracle.directions(state), start)
-        assert twin.error(start) < CLOSED
-        assert np.allclose(twin.directions(start), oracle.directions(state), atol=1e-10)
-        assert np.allclose(twin.pose(start, "platform"), oracle.pose(state, "platform"), atol=1e-10)
-        rho = twin.relation(start, unit_length=oracle.length)
+        start = model.assemble(oracle.pose(state, "platform"), oracle.directions(state), start)
+        assert model.error(start) < CLOSED
+        assert np.allclose(model.directions(start), oracle.directions(state), atol=1e-10)
+        assert np.allclose(model.pose(start, "platform"), oracle.pose(state, "platform"), atol=1e-10)
+        rho = model.relation(start, unit_length=oracle.length)
         assert same_relation(oracle.relation(state), rho) < 1e-8
 
 
@@ -355,12 +355,12 @@ def lifted(mechanism: Mechanism) -> Mechanism:
 @pytest.mark.parametrize("camera", [None, "platform"])
 def test_chains_with_six_freedoms_change_nothing(name: str, camera: str | None) -> None:
     real = replace(KNOWN[name][0](), camera=camera)
-    oracle, twin = Oracle(real), Oracle(lifted(real))
-    start = twin.zero()
+    oracle, model = Oracle(real), Oracle(lifted(real))
+    start = model.zero()
     for state in oracle.random_walk(np.random.default_rng(42), 2, 0.2):
-        start = twin.assemble(oracle.pose(state, "platform"), oracle.directions(state), start)
-        assert twin.mobility(start) == oracle.mobility(state)
-        assert same_relation(oracle.relation(state), twin.relation(start, unit_length=oracle.length)) < 1e-8
+        start = model.assemble(oracle.pose(state, "platform"), oracle.directions(state), start)
+        assert model.mobility(start) == oracle.mobility(state)
+        assert same_relation(oracle.relation(state), model.relation(start, unit_length=oracle.length)) < 1e-8
 
 
 def test_directions_that_contradict_the_pose_are_not_assembled() -> None:
@@ -421,15 +421,15 @@ def test_moving_the_geometry_moves_the_relation(mechanism: Mechanism, seed: int)
     mechanism = replace(mechanism, observations=observations, camera="platform")
     moved = transformed(mechanism, R, p)
     oracle, (state,) = walked(mechanism, size=0.2)
-    twin = Oracle(moved)
+    model = Oracle(moved)
     X = np.eye(4)
     X[:3, :3], X[:3, 3] = R, p
     there = np.array(
         [X_BL if name == mechanism.base else X @ X_BL for name, X_BL in zip(mechanism.links, state, strict=True)]
     )
-    assert twin.error(there) < CLOSED
+    assert model.error(there) < CLOSED
     turn = np.kron(np.eye(2), R)
-    rho, rho_moved = oracle.relation(state), twin.relation(there)
+    rho, rho_moved = oracle.relation(state), model.relation(there)
     assert moved.length == pytest.approx(mechanism.length)
     assert same_relation(np.vstack((turn @ rho[:6], rho[6:])), rho_moved) < 1e-7
 
@@ -452,11 +452,11 @@ def test_names_order_and_cut_do_not_change_the_relation(mechanism: Mechanism, se
 
     shuffled = reordered(mechanism, rng)
     assert sorted(shuffled.joints) == sorted(mechanism.joints)
-    twin = Oracle(shuffled)
+    model = Oracle(shuffled)
     there = np.array([oracle.pose(state, name) for name in shuffled.links])
     legs = [each.leg for each in mechanism.observations]
     rows = [*range(6)] + [6 + 3 * legs.index(each.leg) + k for each in shuffled.observations for k in range(3)]
-    assert same_relation(twin.relation(there), rho[rows]) < 1e-8
+    assert same_relation(model.relation(there), rho[rows]) < 1e-8
 
 
 @quick
@@ -465,9 +465,9 @@ def test_a_split_keeps_the_relation(mechanism: Mechanism, seed: int, kind: str) 
     rng = np.random.default_rng(seed)
     other = split(mechanism, rng, (kind,))
     assert is_well_cut(other)
-    oracle, twin = Oracle(mechanism), Oracle(other)
+    oracle, model = Oracle(mechanism), Oracle(other)
     added = kind == "coaxial" and other is not mechanism
-    assert twin.error(twin.zero()) < 1e-12
-    assert twin.mobility(twin.zero()) == oracle.mobility(oracle.zero()) + added
+    assert model.error(model.zero()) < 1e-12
+    assert model.mobility(model.zero()) == oracle.mobility(oracle.zero()) + added
     rho = oracle.relation(oracle.zero())
-    assert same_relation(rho, twin.relation(twin.zero(), unit_length=oracle.length)) < 1e-8
+    assert same_relation(rho, model.relation(model.zero(), unit_length=oracle.length)) < 1e-8

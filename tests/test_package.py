@@ -15,11 +15,11 @@ from packaging.utils import canonicalize_name
 import hrsynth
 from hrsynth.analysis import controllability
 from hrsynth.analysis import derive as derivation
-from hrsynth.description import load, save, shipped
+from hrsynth.description import list_robots, load, save
 
 
 def test_public_names_are_those_of_their_modules():
-    assert (hrsynth.load, hrsynth.save, hrsynth.shipped) == (load, save, shipped)
+    assert (hrsynth.load, hrsynth.save, hrsynth.list_robots) == (load, save, list_robots)
     assert (hrsynth.derive, hrsynth.legs) == (derivation.derive, controllability.legs)
     assert set(hrsynth.__all__) <= set(dir(hrsynth))
 

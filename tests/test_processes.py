@@ -17,18 +17,18 @@ from hrsynth.processes import run_shared
 
 COMMANDS = {
     "basins": ["basins", "rrrrr_m1", "--to", "x=0.02,y=0.24", "--grid", "x=-0.2:0.2:45,y=0.1:0.3:45", "--jobs", "2"],
-    "endings": ["endings", "rrrrr_m1", "--at", "x=0.02", "--jobs", "2"],
+    "equilibria": ["equilibria", "rrrrr_m1", "--at", "x=0.02", "--jobs", "2"],
     "build": ["catalog", "build", "planar", "-o", "built", "--workers", "2"],
     "site": ["catalog", "site", "--group", "planar", "-o", "site", "--workers", "2"],
 }
 CLI = """
 import sys
-import hrsynth.simulation.endings.subdivision as boxes
+import hrsynth.simulation.equilibria.subdivision as boxes
 from hrsynth.cli import execute
 boxes.BOXES_ALONE, boxes.BOXES_A_PART = 1, 1000
 sys.exit(execute(sys.argv[1:]))
 """
-MAP = "import hrsynth; hrsynth.map('check', ['quattro'], poses=['z=-0.7'] * 20_000, jobs=2)"
+MAP = "import hrsynth; hrsynth.map_robots('check', ['quattro'], poses=['z=-0.7'] * 20_000, jobs=2)"
 END = 15.0
 """Seconds within which all processes have ended, one that was still starting too; left alone they wait for minutes."""
 SHARED_MEMORY = Path("/dev/shm")

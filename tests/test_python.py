@@ -17,7 +17,7 @@ import hrsynth
 from hrsynth.errors import BadRequest, CertificateRefused
 
 FUNCTIONS = sorted({*hrsynth.__all__} - {"__version__", "catalog"})
-SLOW = {"atlas", "draw", "select"}
+SLOW = {"aspects", "draw", "select"}
 
 
 @pytest.mark.some(2)
@@ -39,7 +39,7 @@ def test_help_has_an_example_that_works(name: str):
         (lambda wrong: hrsynth.select("3rrr_m1", start="x=0", goal="x=0", **wrong("run")), "runs"),
         (lambda wrong: hrsynth.observe("3rrr_m1", **wrong("leg")), "legs"),
         (lambda wrong: hrsynth.servo("3rrr_m1", start="x=0", goal="x=0", **wrong("gian")), "gain"),
-        (lambda wrong: hrsynth.map("check", ["3rrr_m1"], jobs=1, **wrong("camra")), "camera"),
+        (lambda wrong: hrsynth.map_robots("check", ["3rrr_m1"], jobs=1, **wrong("camra")), "camera"),
         (lambda wrong: hrsynth.draw(hrsynth.modes("rrrrr_m1"), **wrong("widht")), "width"),
         (lambda wrong: hrsynth.load("3rrr_m1", **wrong("platfrom")), "platform"),
         (lambda wrong: hrsynth.save("3rrr_m1", "x.xml", **wrong("mesh")), "meshes"),
@@ -81,20 +81,20 @@ def test_a_wrong_keyword_is_told_with_the_nearest_and_all(ask: Any, near: str):
         (lambda: hrsynth.accuracy("rrrrr_m1", cone=0.01, noise=3), "a text such as 0.1deg"),
         (lambda: hrsynth.servo("rrrrr_m1", start="x=0", goal="x=0", gain="x"), "a number"),
         (lambda: hrsynth.servo("rrrrr_m1", start="x=0", goal="x=0", noise=3), "a text such as 0.1deg"),
-        (lambda: hrsynth.singular("rrrrr_m1", points=0), "points, found 0, allowed: an integer, at least 1"),
+        (lambda: hrsynth.singularities("rrrrr_m1", points=0), "points, found 0, allowed: an integer, at least 1"),
         (lambda: hrsynth.modes("rrrrr_m1", effort=-1), "effort, found -1, allowed: a number, at least 0"),
         (lambda: hrsynth.modes("rrrrr_m1", effort=math.nan), "effort, found nan, allowed: a number, at least 0"),
-        (lambda: hrsynth.singular("rrrrr_m1", points=10**8), "an integer, at least 1, at most 1e"),
+        (lambda: hrsynth.singularities("rrrrr_m1", points=10**8), "an integer, at least 1, at most 1e"),
         (
             lambda: hrsynth.accuracy("rrrrr_m1", cone=0.01, plane="", steps=1),
             "^steps, found 1, .* at least 5, at most 300",
         ),
         (lambda: hrsynth.basins("rrrrr_m1", to="x=0", steps=301), "^steps, found 301, .* at least 2, at most 300"),
         (lambda: hrsynth.basins("rrrrr_m1", to="x=0", jobs=0), "^jobs, found 0, .* at least 1$"),
-        (lambda: hrsynth.endings("rrrrr_m1", at="x=0", effort=0), "^effort, found 0, .* at least 1$"),
+        (lambda: hrsynth.equilibria("rrrrr_m1", at="x=0", effort=0), "^effort, found 0, .* at least 1$"),
         (lambda: hrsynth.servo("rrrrr_m1", start="x=0", goal="x=0", gain=1e7), "^gain, .* at most 1e"),
         (lambda: hrsynth.select("rrrrr_m1", start="x=0", goal="x=0", examine=0), "^examine, found 0, .* at least 1$"),
-        (lambda: hrsynth.draw(hrsynth.singular("rrrrr_m1", points=5), steps=1), "^steps, found 1, .* at least 5"),
+        (lambda: hrsynth.draw(hrsynth.singularities("rrrrr_m1", points=5), steps=1), "^steps, found 1, .* at least 5"),
         (lambda: hrsynth.verify(None), "a file, allowed: its path"),
         (lambda: hrsynth.save("rrrrr_m1", None), "a file, allowed: its path"),
         (lambda: hrsynth.draw(hrsynth.derive("rrrrr_m1"), 3), "a file, found 3, allowed: its path"),
@@ -163,6 +163,6 @@ def test_a_picture_is_written_in_any_kind_of_file(tmp_path: Path):
     for wrong in ("d.jpg", "d"):
         with pytest.raises(BadRequest, match=r"\.png, \.pdf, \.svg"):
             hrsynth.draw(found, tmp_path / wrong)
-    with pytest.raises(BadRequest, match="atlas"):
+    with pytest.raises(BadRequest, match="aspects"):
         hrsynth.draw(hrsynth.legs("rrrrr_m1"))
     assert {file.name for file in tmp_path.iterdir()} == {"a.pdf", "b.svg", "c.png"}

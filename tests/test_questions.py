@@ -30,7 +30,7 @@ FUNCTIONS = (
     "path",
     "select",
     "servo",
-    "singular",
+    "singularities",
     "view",
 )
 
@@ -258,7 +258,7 @@ def test_help_of_the_package_shows_each_function_with_its_options():
 
 class TestMemory:
     def test_the_same_question_is_answered_once(self):
-        hrsynth.forget()
+        hrsynth.clear_cache()
         robot = hrsynth.load("3rrr_m1")
         first = hrsynth.derive(robot, [1, 2])
         assert hrsynth.derive(robot, [1, 2]) is first
@@ -267,7 +267,7 @@ class TestMemory:
         assert hrsynth.derive(robot, [1, 3]) is not first
         assert hrsynth.derive(robot, [1, 2], seed=1) is not first
         assert hrsynth.check(robot, at=[0.01, 0, 0]) is hrsynth.check(robot, at=[0.01, 0, 0])
-        hrsynth.forget()
+        hrsynth.clear_cache()
         assert hrsynth.derive(robot, [1, 2]) is not first
         assert hrsynth.derive(robot, [1, 2]) == first
 
@@ -283,12 +283,12 @@ class TestMemory:
     def test_the_file_belongs_to_the_question(self, tmp_path):
         """An equal robot in another file: messages and meshes are that file's."""
         hrsynth.save("3rrr_m1", tmp_path / "other.urdf")
-        assert hrsynth.legs("3rrr_m1").setting.robot.file != hrsynth.legs(tmp_path / "other.urdf").setting.robot.file
-        assert hrsynth.legs(tmp_path / "other.urdf").setting.robot.file == str(tmp_path / "other.urdf")
+        assert hrsynth.legs("3rrr_m1").setup.robot.file != hrsynth.legs(tmp_path / "other.urdf").setup.robot.file
+        assert hrsynth.legs(tmp_path / "other.urdf").setup.robot.file == str(tmp_path / "other.urdf")
 
     def test_what_went_on_without_a_package_is_asked_again(self):
         """The package may be there the next time."""
-        from hrsynth.analysis.question import AnswerMemory
+        from hrsynth.analysis.analysis_declaration import AnswerMemory
 
         def asked(missing: bool) -> str:
             if missing:
@@ -301,7 +301,7 @@ class TestMemory:
         assert found == ["without", "with", "with"]
 
     def test_only_so_much_is_kept(self):
-        from hrsynth.analysis.question import AnswerMemory
+        from hrsynth.analysis.analysis_declaration import AnswerMemory
 
         memory = AnswerMemory(3)
         for k in (*range(5), 3):
@@ -342,7 +342,7 @@ class TestErrors:
 class TestExamples:
     @pytest.mark.slow
     def test_robots_of_the_package_are_read_by_name(self):
-        names = hrsynth.examples()
+        names = hrsynth.list_examples()
         assert len(names) > 60
         assert all(path.is_file() for path in names.values())
         robot = hrsynth.load("example:cassie", base="pelvis", platform="left-tarsus")

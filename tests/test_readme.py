@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from hrsynth.cli import execute
-from hrsynth.description import shipped
+from hrsynth.description import list_robots
 from tables import catalog, observation_kinds, replays, robots
 from tables.markdown import block, line, replace_between
 from tables.printed_runs import REPLAYS, SIMULATED
@@ -38,12 +38,12 @@ def lines() -> dict[str, str]:
 
 
 def test_the_table_has_every_shipped_robot_in_order():
-    assert list(lines()) == list(shipped())
+    assert list(lines()) == list(list_robots())
     assert block(ROBOTS, robots.START).splitlines()[:2] == robots.table([]).splitlines()
 
 
 @pytest.mark.some(1, 7)
-@pytest.mark.parametrize("name", sorted(shipped(), key="3prp".__ne__))
+@pytest.mark.parametrize("name", sorted(list_robots(), key="3prp".__ne__))
 def test_the_row_of_a_robot_is_fresh(name: str):
     assert lines()[name] == line(robots.row(name)), "the page is stale: make readme"
 

@@ -26,24 +26,24 @@ ASKED = {
     "robot": lambda: hrsynth.load("quattro"),
     "observe": lambda: hrsynth.observe(hrsynth.load("quattro"), LEGS),
     "derive": lambda: hrsynth.derive(hrsynth.load("quattro"), LEGS),
-    "certificate": lambda: hrsynth.derive(hrsynth.load("quattro"), LEGS).certificate,
+    "certificate": lambda: hrsynth.derive(hrsynth.load("quattro"), LEGS).equivalence,
     "verdict": lambda: hrsynth.derive(hrsynth.load("quattro"), LEGS).verdict,
     "legs": lambda: hrsynth.legs(hrsynth.load("3rpr_m1")),
     "check": lambda: hrsynth.check(hrsynth.load("quattro"), LEGS, at=[START], grid="x=-0.1:0.1:3,y=0,z=-0.7"),
     "check loops": lambda: hrsynth.check(
         hrsynth.load("quattro").changed(choice=PlatformChoice("open", "several could be"))
     ),
-    "singular": lambda: hrsynth.singular(hrsynth.load("quattro"), LEGS, points=50),
+    "singularities": lambda: hrsynth.singularities(hrsynth.load("quattro"), LEGS, points=50),
     "advise": lambda: hrsynth.advise(hrsynth.load("quattro"), ["1"]),
     "accuracy": lambda: hrsynth.accuracy(hrsynth.load("quattro"), LEGS, cone="0.1deg", plane="z=-0.7", steps=5),
     "branch": lambda: hrsynth.branch(hrsynth.load("rrrrr_m1"), "shoulder_1=-0.05:0.05,shoulder_2=-0.05:0.05"),
     "modes": lambda: hrsynth.modes(hrsynth.load("quattro"), LEGS, at=GOAL),
     "modes planar": lambda: hrsynth.modes(hrsynth.load("3rrr_m1")),
-    "atlas": lambda: hrsynth.atlas(hrsynth.load("3rrr_m1")),
+    "aspects": lambda: hrsynth.aspects(hrsynth.load("3rrr_m1")),
     "lint": lambda: hrsynth.lint("quattro"),
     "path": lambda: hrsynth.path(hrsynth.load("3rrr_m1"), start="x=0.01,y=0,phi=0", goal="x=-0.01,y=0,phi=0.05"),
     "servo": lambda: hrsynth.servo(hrsynth.load("3rrr_m1"), start="x=0.01,y=0,phi=0", goal="x=-0.01,y=0,phi=0.05"),
-    "endings": lambda: hrsynth.endings(hrsynth.load("rrrrr_m1"), at="x=0,y=0.25"),
+    "equilibria": lambda: hrsynth.equilibria(hrsynth.load("rrrrr_m1"), at="x=0,y=0.25"),
     "basins": lambda: hrsynth.basins("rrrrr_m1", to="x=0,y=0.25", grid="x=-0.01:0.01:2,y=0.25", jobs=1),
     "select": lambda: hrsynth.select(
         hrsynth.load("3rrr_m1"), start="x=0.01,y=0,phi=0", goal="x=-0.01,y=0,phi=0.05", runs=1, examine=1
@@ -130,7 +130,7 @@ def test_arrays_stay_read_only():
 @pytest.mark.slow
 def test_an_answer_is_read_in_another_process(tmp_path):
     """Nothing in it depends on what was computed in the process that made it."""
-    for name in ("singular", "modes", "derive"):
+    for name in ("singularities", "modes", "derive"):
         (tmp_path / name).write_bytes(pickle.dumps(asked(name)))
     code = (
         "import pickle, sys; from pathlib import Path\n"
@@ -143,7 +143,7 @@ def test_an_answer_is_read_in_another_process(tmp_path):
         check=True,
         env={"PYTHONPATH": str(Path(hrsynth.__file__).parents[1]), "PYTHONIOENCODING": "utf-8"},
     )
-    assert run.stdout.splitlines() == [repr(asked(name)) for name in ("derive", "modes", "singular")]
+    assert run.stdout.splitlines() == [repr(asked(name)) for name in ("derive", "modes", "singularities")]
 
 
 def test_a_verdict_is_equal_to_its_word():

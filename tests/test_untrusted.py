@@ -442,7 +442,7 @@ ALLOWED = {
     "batch/sections.py": {"exec"},
     "codegen/rounding.py": {"exec"},
     "batch/program.py": {"exec_module"},
-    "simulation/endings/subdivision.py": {"loads of pickle"},
+    "simulation/equilibria/subdivision.py": {"loads of pickle"},
     "untrusted.py": {"run_path"},
 }
 """What runs text or unpickles, of this program's own making: straight-line code of numbers, the state of a search that

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from hrsynth.analysis.verdict import BLIND, CONTROLLABLE, PARTIAL
+from hrsynth.catalog.architecture_key import SENSORS
 from hrsynth.catalog.query import Catalog, load
 from hrsynth.catalog.store import shipped_folder
-from hrsynth.catalog.words import SENSORS
 
 from .markdown import table as markdown
 

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from hrsynth.analysis.verdict import BLIND, CONTROLLABLE, PARTIAL
+from hrsynth.catalog.architecture_key import ArchitectureKey, LegKey, parse
 from hrsynth.catalog.groups.spatial import translates
 from hrsynth.catalog.query import Catalog
-from hrsynth.catalog.words import LegWord, RobotWord, parse
 
 from .markdown import replace_between, table
 
@@ -21,7 +21,7 @@ INFINITY, RAIL, GENERAL = "line at infinity", "line across the rails", "line in 
 Record = Mapping[str, Any]
 
 
-def mark(leg: LegWord) -> int:
+def mark(leg: LegKey) -> int:
     """The joint after which the observed link of a leg follows."""
     if leg.observed is not None:
         return leg.observed
@@ -33,7 +33,7 @@ def mark(leg: LegWord) -> int:
     return before
 
 
-def centres(leg: LegWord, end: int = 0) -> str | None:
+def centres(leg: LegKey, end: int = 0) -> str | None:
     """Where the platform's instantaneous centre can be while the observed direction of a planar leg is held; None where
     that is anywhere. ``end``: how many joints at the platform are left out."""
     last, joints = mark(leg), leg.joints[: len(leg.joints) - end]
@@ -50,7 +50,7 @@ def centres(leg: LegWord, end: int = 0) -> str | None:
     return RAIL if [(joint.letter, joint.axes) for joint in rest if joint.letter != "R"] == [("P", "x")] else GENERAL
 
 
-def planar_rank(word: RobotWord) -> int:
+def planar_rank(word: ArchitectureKey) -> int:
     """What the legs of a planar robot see: the rank of their lines of centres; of a point, of the ways left to it.
     Rails that are parallel are all along x."""
     point = word.platform == "point"
@@ -60,7 +60,7 @@ def planar_rank(word: RobotWord) -> int:
     return min(3, min(2, (found[INFINITY] > 0) + found[RAIL]) + found[GENERAL])
 
 
-def delta_controllable(word: RobotWord, dof: int) -> bool:
+def delta_controllable(word: ArchitectureKey, dof: int) -> bool:
     """Whether deltas of these legs are controllable: their slides are not all parallel, and the legs are enough."""
     first = {leg.unmoved.joints[0] for leg in word.legs}
     parallel = len({joint.axes for joint in first}) == 1 and all(
@@ -69,7 +69,7 @@ def delta_controllable(word: RobotWord, dof: int) -> bool:
     return not parallel and 2 * len(word.legs) >= dof
 
 
-def translating(word: RobotWord) -> bool:
+def translating(word: ArchitectureKey) -> bool:
     """Whether a word is of legs that translate (:func:`hrsynth.catalog.groups.spatial.translates`) and of no others."""
     joints = [joint for leg in word.legs for joint in leg.joints]
     return all(joint.letter in "RP" and joint.axes in "abhjk" for joint in joints) and all(
@@ -77,13 +77,13 @@ def translating(word: RobotWord) -> bool:
     )
 
 
-def split(leg: LegWord, place: int) -> int:
+def split(leg: LegKey, place: int) -> int:
     """Of how many directions of R some, but not all, come before a place in a leg."""
     axes = [joint.axes if joint.letter == "R" else "" for joint in leg.joints]
     return sum(0 < axes[:place].count(axis) < axes.count(axis) for axis in set(axes) - {""})
 
 
-def translation_rank(word: RobotWord) -> int:
+def translation_rank(word: ArchitectureKey) -> int:
     """What legs that translate see: each the directions of R on both sides of the watched link, all together at most
     three. Slides of the catalog are normal to z: legs with two that never turn see z, and so does a leg with one that
     tells two numbers, which are all that is normal to it."""

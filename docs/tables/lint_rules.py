@@ -13,7 +13,7 @@ def table() -> str:
     """The Markdown table of all rules, as they say it themselves."""
     rows = []
     for rule in lint_rules().values():
-        advice = f"{rule.advice} (`--fix`)" if rule.mends else rule.advice
+        advice = f"{rule.advice} (`--fix`)" if rule.fixable else rule.advice
         cells = (f"`{rule.name}`", rule.severity, rule.title, rule.explanation, advice)
         rows.append([each.replace("<", "&lt;") for each in cells])
     return markdown(("rule", "severity", "what it finds", "why it matters", "what to do"), rows)

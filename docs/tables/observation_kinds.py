@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from hrsynth.geometry.vectors import frozen, unit
+from hrsynth.mechanism.cameras import ViewGeometry
 from hrsynth.mechanism.notation import Letter, Word
 from hrsynth.mechanism.observations import kinds
-from hrsynth.mechanism.sights import Sighting
 
 from .markdown import table as markdown
 
 START = "<!-- generated: kinds -->"
-AT = Sighting(np.zeros(3), np.array([0, 0, 1.0]), np.array([0.3, 0.2, 1.0]), unit((1, 2, 0.5)))
+AT = ViewGeometry(np.zeros(3), np.array([0, 0, 1.0]), np.array([0.3, 0.2, 1.0]), unit((1, 2, 0.5)))
 """Where a camera and a link may be: the words of chains do not depend on it."""
 
 
@@ -29,7 +29,7 @@ def table() -> str:
                 kind.rank,
                 chain_word(word),
                 kind.locked,  # type: ignore[attr-defined]
-                kind.fed_back,
+                kind.feature_error,
             )
         )
     return markdown(

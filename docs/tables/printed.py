@@ -9,7 +9,7 @@ from functools import cache
 from hrsynth.analysis.derive import derive
 from hrsynth.analysis.modes.assembly_mode import AssemblyMode
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
-from hrsynth.description import load, shipped
+from hrsynth.description import list_robots, load
 
 from .markdown import table as markdown
 from .printed_claims import CLAIMS, FORMS, Place, PrintedClaim, PrintedForm
@@ -28,7 +28,7 @@ def forms_table() -> str:
 
 def form_row(form: PrintedForm) -> tuple[str, ...]:
     """One printed form's row."""
-    found = str(derive(load(shipped()[form.robot]), form.legs, unchecked=False).hidden_architecture)
+    found = str(derive(load(list_robots()[form.robot]), form.legs, unchecked=False).hidden_architecture)
     same = any(found in (each, f"{found.partition('-')[0]}-{each}") for each in form.hidden)
     return (
         form.source,
@@ -44,7 +44,7 @@ def form_row(form: PrintedForm) -> tuple[str, ...]:
 @cache
 def compute_modes(claim: PrintedClaim) -> AssemblyModes:
     """All modes with the directions that the claim's legs have at its desired pose."""
-    return modes(load(shipped()[claim.robot]), claim.legs, at=claim.at)
+    return modes(load(list_robots()[claim.robot]), claim.legs, at=claim.at)
 
 
 def nearest(place: Place, found: AssemblyModes) -> AssemblyMode:
@@ -68,7 +68,7 @@ def _rows(claim: PrintedClaim) -> Iterator[tuple[str, ...]]:
         yield (*head, ", ".join(f"{v:g}" for v in each.place), _write_place(mode), f"{apart:.0f} mm", each.remark)
     for mode in found.modes:
         if mode not in met:
-            reached = f"; legs {', '.join(mode.open)} do not reach it" if mode.reachable is False else ""
+            reached = f"; legs {', '.join(mode.unclosed_legs)} do not reach it" if mode.reachable is False else ""
             yield (*head, "–", _write_place(mode), "–", f"not printed{reached}")
 
 

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 
 from hrsynth.analysis.accuracy.accuracy import accuracy
-from hrsynth.description import load, shipped
+from hrsynth.description import list_robots, load
 from hrsynth.mechanism.pose import Pose
 from hrsynth.simulation.result import Servo
 from hrsynth.simulation.servo import servo
@@ -43,7 +43,7 @@ ALIKE = 1.5
 def compute_run(replay: Replay, seed: int = 0) -> Servo:
     """The run with one draw of the noise."""
     return servo(
-        load(shipped()[replay.robot]),
+        load(list_robots()[replay.robot]),
         replay.legs,
         start=replay.way[0],
         goal=replay.way[1],
@@ -63,18 +63,18 @@ def table(replays: Sequence[Replay] = REPLAYS) -> str:
 def row(replay: Replay) -> tuple[str, ...]:
     """One run's row."""
     found = compute_run(replay)
-    here = found.ended
+    here = found.outcome
     if found.spread is not None:
         s = found.spread
         metres, radians = _error(replay)
-        turns = found.setting.motion.rotations.shape[1]
+        turns = found.setup.motion.rotations.shape[1]
         here += f" ± {1e3 * metres:.2g} mm" + (f", {radians:.1g} rad" if turns else "")
         if s.aside:
             here += f", about {_place(Pose(*s.mean))}"
     else:
         here += f" {_place(found.pose)}"
     noise = "–" if replay.noise is None else replay.noise if "deg" in replay.noise else f"{replay.noise} rad, bench"
-    same = "yes" if found.ended == replay.ended else "no"
+    same = "yes" if found.outcome == replay.ended else "no"
     return (
         replay.source,
         f"`{replay.robot}`",
@@ -125,7 +125,7 @@ def _bound(replay: Replay) -> str:
     """The largest error that directions within a cone of the printed noise can cause at the goal, to first order."""
     if replay.noise is None or "deg" not in replay.noise:
         return "–"
-    found = accuracy(load(shipped()[replay.robot]), replay.legs, cone=replay.noise, at=replay.way[1]).poses[0]
+    found = accuracy(load(list_robots()[replay.robot]), replay.legs, cone=replay.noise, at=replay.way[1]).poses[0]
     turn = f", {found.orientation.largest:.1g} rad" if found.orientation.largest > 0 else ""
     return f"{1e3 * found.position.largest:.2g} mm{turn}"
 

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 
 from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.derive import derive
-from hrsynth.analysis.singularity.singular import singular
-from hrsynth.description import load, shipped
+from hrsynth.analysis.singularity.singularities import singularities
+from hrsynth.description import list_robots, load
 
 from .markdown import table as markdown
 
@@ -31,17 +31,17 @@ _LONGEST_LIST = 4
 
 def row(name: str) -> tuple[str, ...]:
     """One shipped robot's row: no number in it that a rounding error can change."""
-    mechanism = load(shipped()[name])
+    mechanism = load(list_robots()[name])
     found, sets = derive(mechanism), legs(mechanism)
     hidden = found.hidden_architecture
-    lost = "; ".join(freedom.name for freedom in found.verdict.lost)
+    lost = "; ".join(freedom.name for freedom in found.verdict.unobserved)
     smallest = "–" if hidden is None else _smallest(sets.minimal)
     exact = (
         "not decided"
         if not found.exact.exact
         else ("proved" if found.exact.proved else f"{found.exact.instances} instances")
     )
-    words = singular(mechanism, points=POINTS).words
+    words = singularities(mechanism, points=POINTS).words
     if words.startswith("always"):
         words = "always" + "".join(words.partition(", because")[1:])
     return (
@@ -59,7 +59,7 @@ def row(name: str) -> tuple[str, ...]:
 
 def table(names: Iterable[str] | None = None) -> str:
     """The Markdown table of the shipped robots (default: all)."""
-    return markdown(HEADS, map(row, shipped() if names is None else names))
+    return markdown(HEADS, map(row, list_robots() if names is None else names))
 
 
 def _smallest(sets: Sequence[Sequence[str]]) -> str:

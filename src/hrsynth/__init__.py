@@ -6,7 +6,7 @@
     found.verdict == "controllable"
     hrsynth.check("quattro", at=[0.02, 0.1, -0.7])      # a pose: text, dict, numbers, 4 x 4 matrix, pinocchio.SE3
     hrsynth.view("quattro", [1, 4])                     # in a notebook: the robot, which moves
-    hrsynth.map("check", ["quattro", "delta"], poses=[[0, 0, -0.7], [0.1, 0, -0.7]])    # in several processes
+    hrsynth.map_robots("check", ["quattro", "delta"], poses=[[0, 0, -0.7], [0.1, 0, -0.7]])    # in several processes
 
 An answer is one line at a prompt; ``print`` shows it in full, ``to_dict()`` is its JSON, ``hrsynth.draw`` its picture.
 """

@@ -3,24 +3,24 @@
 from . import catalog as catalog
 from .analysis.accuracy.accuracy import accuracy as accuracy
 from .analysis.advice import advise as advise
-from .analysis.asked import observe as observe
-from .analysis.aspects.atlas import atlas as atlas
+from .analysis.analysis_declaration import clear_cache as clear_cache
+from .analysis.aspects.aspects import aspects as aspects
 from .analysis.aspects.path import path as path
 from .analysis.branch.proof import branch as branch
 from .analysis.check import check as check
 from .analysis.controllability import legs as legs
 from .analysis.derive import derive as derive
 from .analysis.modes.modes import modes as modes
-from .analysis.question import forget as forget
-from .analysis.singularity.singular import singular as singular
-from .analysis.study import map as map
+from .analysis.parallel_map import map_robots as map_robots
+from .analysis.pose_requests import observe as observe
+from .analysis.singularity.singularities import singularities as singularities
 from .certificates import certificate as certificate
 from .certificates import verify as verify
 from .codegen.export import export as export
-from .description import examples as examples
+from .description import list_examples as list_examples
+from .description import list_robots as list_robots
 from .description import load as load
 from .description import save as save
-from .description import shipped as shipped
 from .kinematics.pinocchio_export import to_pinocchio as to_pinocchio
 from .linting.lint import lint as lint
 from .present.show import draw as draw
@@ -28,10 +28,10 @@ from .present.show import html as html
 from .present.show import text as text
 from .present.studio.server import studio as studio
 from .present.view.view import view as view
-from .progress import following as following
+from .progress import on_progress as on_progress
 from .selection.select import select as select
-from .simulation.endings.basins import basins as basins
-from .simulation.endings.endings import endings as endings
+from .simulation.equilibria.basins import basins as basins
+from .simulation.equilibria.equilibria import equilibria as equilibria
 from .simulation.servo import servo as servo
 from .version import __version__ as __version__
 
@@ -39,32 +39,32 @@ __all__ = [
     "__version__",
     "accuracy",
     "advise",
-    "atlas",
+    "aspects",
     "basins",
     "branch",
     "catalog",
     "certificate",
     "check",
+    "clear_cache",
     "derive",
     "draw",
-    "endings",
-    "examples",
+    "equilibria",
     "export",
-    "following",
-    "forget",
     "html",
     "legs",
     "lint",
+    "list_examples",
+    "list_robots",
     "load",
-    "map",
+    "map_robots",
     "modes",
     "observe",
+    "on_progress",
     "path",
     "save",
     "select",
     "servo",
-    "shipped",
-    "singular",
+    "singularities",
     "studio",
     "text",
     "to_pinocchio",

@@ -40,11 +40,11 @@ def warn_caller(text: str, kind: type[Warning]) -> None:
     warnings.warn(text, kind, stacklevel=level)
 
 
-class GuessedBase(UserWarning):
+class AssumedBase(UserWarning):
     """Warning that a file leaves open which link is the base, and which is taken for it."""
 
 
-class GuessedPlatform(UserWarning):
+class AssumedPlatform(UserWarning):
     """Warning that a file names no platform, and which link is taken for it."""
 
 
@@ -124,18 +124,18 @@ class BadMechanism(BadRequest):
     """A mechanism whose parts contradict each other (a joint of an unknown link, a zero axis)."""
 
 
-class NotMeasured(BadRequest):
+class UndefinedValue(BadRequest):
     """A measurement that has no value at a configuration: a camera inside the cylinder, or at the point, that it
     sees."""
 
 
-class Unanswered(HrsynthError):
+class NoResult(HrsynthError):
     """Base of the errors for sound requests that have no answer."""
 
     exit_status = 3
 
 
-class LoopsNotClosed(Unanswered):
+class LoopsNotClosed(NoResult):
     """Loops are open: the residual that is left, the loop with the largest miss, and what may help, if known."""
 
     def __init__(self, robot: str, residual: float, tolerance: float, loop: str, cure: str = "") -> None:
@@ -146,7 +146,7 @@ class LoopsNotClosed(Unanswered):
         )
 
 
-class MotorsNotEnough(Unanswered):
+class MotorsNotEnough(NoResult):
     """At zero the platform can move while all motors are held: too few motors, or a singular zero configuration; with
     the joints that then move."""
 
@@ -159,7 +159,7 @@ class MotorsNotEnough(Unanswered):
         )
 
 
-class RankUndecided(Unanswered):
+class RankUndecided(NoResult):
     """A rank whose gap is too small for a verdict."""
 
     def __init__(self, what: str, gap: float, needed: float) -> None:
@@ -167,13 +167,13 @@ class RankUndecided(Unanswered):
         super().__init__(f"{what}: the singular values leave a gap of {gap:.3g}, needed: {needed:.3g}")
 
 
-class HeldByRounding(RankUndecided):
+class RankBelowRounding(RankUndecided):
     """Loops that hold directions by no more than what was open: with exact numbers they may move that way."""
 
     def __init__(self, robot: str, directions: int, open_by: float) -> None:
         self.robot, self.directions, self.open_by = robot, directions, open_by
         verb = "holds" if directions == 1 else "hold"
-        Unanswered.__init__(
+        NoResult.__init__(
             self,
             f"{robot}: its rounded numbers leave the loops open by {open_by:.1g} (characteristic lengths, "
             f"radians), and {directions} of their constraints {verb} by no more than that: whether the loops can "
@@ -181,7 +181,7 @@ class HeldByRounding(RankUndecided):
         )
 
 
-class StructureUndecided(Unanswered):
+class StructureUndecided(NoResult):
     """Rounded numbers that fit one structure as well as another."""
 
     def __init__(self, robot: str, tolerance: float, one: str, other: str) -> None:
@@ -193,7 +193,7 @@ class StructureUndecided(Unanswered):
         )
 
 
-class NotSampled(Unanswered):
+class NotSampled(NoResult):
     """Too few closed configurations could be reached from the zero configuration, in how many ``tries``."""
 
     def __init__(self, robot: str, reached: int, wanted: int, tries: int) -> None:
@@ -206,7 +206,7 @@ class NotSampled(Unanswered):
         )
 
 
-class Shaky(Unanswered):
+class InfinitesimalMobility(NoResult):
     """A mechanism whose loops allow more motion to first order than it really has, wherever it goes."""
 
     def __init__(self, robot: str, allowed: int, done: int) -> None:
@@ -218,7 +218,7 @@ class Shaky(Unanswered):
         )
 
 
-class BranchPoint(Unanswered):
+class BranchPoint(NoResult):
     """A zero configuration at which several operation modes meet, or samples from several: what was found of each, and
     a pose in it."""
 
@@ -231,7 +231,7 @@ class BranchPoint(Unanswered):
         )
 
 
-class MeaningUndecided(Unanswered):
+class GeometryAmbiguous(NoResult):
     """Whether a special geometry is meant: the largest defect that would be accepted, the smallest that would not (both
     in sizes of the mechanism), and how far apart they must be."""
 
@@ -243,7 +243,7 @@ class MeaningUndecided(Unanswered):
         )
 
 
-class NothingProved(Unanswered):
+class NothingProved(NoResult):
     """A branch of which no cell at all is proved, and why: there is no function to write."""
 
     def __init__(self, robot: str, motors: Iterable[str], reason: str) -> None:
@@ -262,7 +262,7 @@ class LegMiss(NamedTuple):
     at_least: bool = False
 
 
-class PoseNotReached(Unanswered):
+class PoseNotReached(NoResult):
     """A pose that the robot does not reach from ``origin``: the leg that misses it most and by how much (mm, degrees;
     at least, as rods tell it), or None if each leg alone reaches it; how far the robot came (0 to 1), and to which
     pose; the ``wrist``, a joint that stands for several R, that is near the end of its turns there; ``why`` all legs
@@ -317,7 +317,7 @@ class PoseNotReached(Unanswered):
         return super().lines() + [line for each in self.others for line in each.lines()]
 
 
-class PlaneNotMet(Unanswered):
+class NoReachablePose(NoResult):
     """A plane or grid of poses none of which the robot reaches, and why; that their parts depend on each other."""
 
     def __init__(self, robot: str, plane: str, reason: str, dependent: str | None = None) -> None:
@@ -326,7 +326,7 @@ class PlaneNotMet(Unanswered):
         super().__init__(f"{robot}: no pose of {plane} is reached: {reason}")
 
 
-class Disagreement(Unanswered):
+class Disagreement(NoResult):
     """The words, the expression and the rank do not agree about where a robot is singular."""
 
     def __init__(self, robot: str, poses: int, angle: float) -> None:
@@ -337,7 +337,7 @@ class Disagreement(Unanswered):
         )
 
 
-class NotConfined(Unanswered):
+class UnsupportedLocus(NoResult):
     """A robot whose tips, with the directions held, move on something other than points, lines and circles."""
 
     def __init__(self, robot: str, reason: str) -> None:
@@ -345,7 +345,7 @@ class NotConfined(Unanswered):
         super().__init__(f"{robot}: its assembly modes cannot be listed, not supported here: {reason}")
 
 
-class NotConfirmed(Unanswered):
+class NotConfirmed(NoResult):
     """An architecture without an exact verdict that closed configurations confirm, and why."""
 
     def __init__(self, robot: str, what: str) -> None:
@@ -353,7 +353,7 @@ class NotConfirmed(Unanswered):
         super().__init__(f"{robot}: no confirmed verdict: {what}")
 
 
-class NotCertified(Unanswered):
+class NoEquivalentRobot(NoResult):
     """No hidden robot passed the certificate: the best angle seen."""
 
     def __init__(self, robot: str, angle: float, tolerance: float) -> None:
@@ -363,7 +363,7 @@ class NotCertified(Unanswered):
         )
 
 
-class NoCertificate(Unanswered):
+class NoCertificate(NoResult):
     """A list of modes, or a verdict, for which there is no certificate, and why."""
 
     def __init__(self, robot: str, reason: str) -> None:
@@ -371,7 +371,7 @@ class NoCertificate(Unanswered):
         super().__init__(f"{robot}: no certificate: {reason}")
 
 
-class CertificateRefused(Unanswered):
+class CertificateRefused(NoResult):
     """A certificate that the checker does not accept: which, and why."""
 
     def __init__(self, source: str, reason: str) -> None:
@@ -379,7 +379,7 @@ class CertificateRefused(Unanswered):
         super().__init__(f"{source}: refused: {reason}")
 
 
-class MissingExtra(Unanswered):
+class MissingExtra(NoResult):
     """Something that needs an optional package which is not installed: what, and the extra that installs it."""
 
     met: ClassVar[int] = 0
@@ -395,7 +395,7 @@ class MissingExtra(Unanswered):
         super().__init__(self.reason)
 
 
-class Unsolved(Unanswered):
+class SystemNotSolved(NoResult):
     """An external solver that gave no answer: which, and why."""
 
     def __init__(self, solver: str, reason: str) -> None:
@@ -403,7 +403,7 @@ class Unsolved(Unanswered):
         super().__init__(f"{solver} did not solve the system: {reason}")
 
 
-class TooLarge(Unanswered):
+class TooLarge(NoResult):
     """A system that needs more effort than is allowed: what, how large it is, the estimated time in seconds, and the
     limit."""
 
@@ -413,7 +413,7 @@ class TooLarge(Unanswered):
         super().__init__(self.reason)
 
 
-class NotRendered(Unanswered):
+class NotRendered(NoResult):
     """Pictures that cannot be rendered on this machine, and why."""
 
     def __init__(self, reason: str) -> None:
@@ -421,7 +421,7 @@ class NotRendered(Unanswered):
         super().__init__(f"pictures cannot be rendered here: {reason} (MUJOCO_GL chooses between egl, osmesa and glfw)")
 
 
-class NeedsPosix(Unanswered):
+class NeedsPosix(NoResult):
     """Something that this operating system does not offer: what needs it, and the module that is missing."""
 
     def __init__(self, what: str, module: str) -> None:
@@ -429,7 +429,7 @@ class NeedsPosix(Unanswered):
         super().__init__(f"{what} needs a POSIX system: this Python has no module {module}")
 
 
-class WorkersLost(Unanswered):
+class WorkersLost(NoResult):
     """Processes that share work and ended before it was done, and why."""
 
     def __init__(self, reason: str) -> None:
@@ -437,7 +437,7 @@ class WorkersLost(Unanswered):
         super().__init__(f"{reason}: it may have run out of memory; fewer processes (--jobs) need less")
 
 
-class BuildStopped(Unanswered):
+class BuildStopped(NoResult):
     """A build of the catalog, or a sweep to a file, that cannot continue: why, and the journal that keeps what was
     done, if any."""
 
@@ -447,7 +447,7 @@ class BuildStopped(Unanswered):
         super().__init__(f"the {what} stopped: {reason}{rest}")
 
 
-class CatalogStale(Unanswered):
+class CatalogStale(NoResult):
     """A stored catalog that differs from what would be built today: what differs, one line each."""
 
     def __init__(self, complaints: Iterable[str]) -> None:

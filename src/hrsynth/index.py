@@ -20,16 +20,16 @@ INDEX, STUB = PACKAGE / "index.json", PACKAGE / "__init__.pyi"
 MARK = "\n@analysis(\n"
 KINDS: dict[str, Any] = {"str": str, "int": int, "float": float, "bool": bool, "several": list[str]}
 HELPERS = {
-    "analysis.asked": ("observe",),
-    "analysis.question": ("forget",),
-    "analysis.study": ("map",),
+    "analysis.analysis_declaration": ("clear_cache",),
+    "analysis.parallel_map": ("map_robots",),
+    "analysis.pose_requests": ("observe",),
     "certificates": ("certificate", "verify"),
-    "description": ("examples", "load", "save", "shipped"),
+    "description": ("list_examples", "list_robots", "load", "save"),
     "kinematics.pinocchio_export": ("to_pinocchio",),
     "linting.lint": ("lint",),
     "present.show": ("draw", "html", "text"),
     "present.studio.server": ("studio",),
-    "progress": ("following",),
+    "progress": ("on_progress",),
 }
 """Public functions that are no analyses of a robot, by their module."""
 

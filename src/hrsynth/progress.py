@@ -10,7 +10,7 @@ _listener: ContextVar[Callable[[str], None] | None] = ContextVar("listener", def
 _part: ContextVar[str] = ContextVar("part", default="")
 
 
-def tell(stage: str) -> None:
+def report(stage: str) -> None:
     """Report one more step of a stage of the question that is being answered."""
     listener = _listener.get()
     if listener is not None:
@@ -28,11 +28,11 @@ def part(name: str) -> Iterator[None]:
 
 
 @contextmanager
-def following(listener: Callable[[str], None]) -> Iterator[None]:
+def on_progress(listener: Callable[[str], None]) -> Iterator[None]:
     """Report each step of all that is asked within to a function: ``with following(print): derive(robot)``.
 
     >>> stages = []
-    >>> with hrsynth.following(stages.append):
+    >>> with hrsynth.on_progress(stages.append):
     ...     found = hrsynth.observe("3rrr_m1", seed=7)
     >>> "sampling" in stages
     True

@@ -111,7 +111,7 @@ class Case:
     def fitted(self, configuration: Any) -> State | None:
         """The own configuration in which all links lie as in the engine's; None if there is none."""
         robot = self.robot
-        names = [name for name in configuration.twin.mechanism.links if name in robot.links and name != robot.links[0]]
+        names = [name for name in configuration.model.mechanism.links if name in robot.links and name != robot.links[0]]
         given, values = [], []
         for name in names:
             X = np.asarray(configuration.pose(name))

@@ -233,7 +233,7 @@ class Search:
 
 def detour(case: Case, told: Any, seconds: float = 6.0) -> State | None:
     """A way between the two poses of an answer of ``path`` that it would have to call no separation."""
-    items = case.directions(told.setting.observed)
+    items = case.directions(told.setup.observed)
     start, goal = case.fitted(told.start.configuration), case.fitted(told.goal.configuration)
     if items is None or start is None or goal is None:
         return None
@@ -254,7 +254,7 @@ def attacked(task: tuple[str, int]) -> dict[str, Any]:
             known = joined(known, at[good])
         said: Counter[str] = Counter()
         wrong = []
-        search = Search(case, case.directions(hrsynth.check(case.engine, ROBOTS[name][1]).setting.observed))
+        search = Search(case, case.directions(hrsynth.check(case.engine, ROBOTS[name][1]).setup.observed))
         anywhere = joined(known, search.assembled(rng, case.robot.zero(), False))
         while sum(said.values()) - said["refused"] < BLOCK and said["refused"] < 10 * BLOCK:
             one, other = (case.text_of(some[[int(rng.integers(len(some)))]]) for some in (known, anywhere))

@@ -237,7 +237,7 @@ class Robot:
         for i, j in self.loops.same:
             if items.point[i] and {self.links[items.links[i]], self.links[items.links[j]]} & body:
                 at = R0[items.links[i]] @ items.local[i] + p0[items.links[i]]
-                twin = [
+                model = [
                     R0[items.links[a]] @ items.local[a]
                     for a, b in self.loops.same
                     if not items.point[a] and (items.links[a], items.links[b]) == (items.links[i], items.links[j])
@@ -245,7 +245,7 @@ class Robot:
                 others = any(
                     {items.links[a], items.links[b]} == {items.links[i], items.links[j]} for a, b in self.loops.dots
                 )
-                ends.append(("R" if len(twin) == 1 and not others else "?", at, twin[0] if twin else None))
+                ends.append(("R" if len(model) == 1 and not others else "?", at, model[0] if model else None))
         if any(kind != "R" or axis is None for kind, _, axis in ends) or len(ends) < 2 or len(self.loops.offsets):
             return None
         _, first, axis = ends[0]

@@ -181,7 +181,7 @@ class Study:
         return found
 
     def rates(self, items: Items, at: State) -> Array:
-        """Rates (N, 3 k, n) of directions, in the metric of :class:`Local`."""
+        """Rates (N, 3 k, n) of directions, in the metric of :class:`LocalDerivatives`."""
         J = self.robot.items(items, self.robot.frames(at))[1]
         metric = np.where(self.robot.slides, self.robot.length, 1.0)
         return np.swapaxes(J, 2, 3).reshape(len(at), -1, self.robot.size) * metric

@@ -92,7 +92,7 @@ def test_a_pose_that_was_not_asked_for_is_found():
 def test_a_false_verdict_is_found():
     case = shipped("quattro")
     told, seen = hrsynth.legs(case.engine), hrsynth.check(case.engine)
-    segments = {each.leg: each for each in seen.setting.segments}
+    segments = {each.leg: each for each in seen.setup.segments}
     verdicts.judge(case, told, segments)
     assert outcomes(case, "verdict") == {HELD}
     case.found.clear()
@@ -183,19 +183,22 @@ def test_a_path_through_a_singularity_is_found():
     assert outcomes(case, "path") == {HELD}
     case.found.clear()
     end = replace(
-        told, ways=told.ways[:-1] if len(told.ways) > 1 else (replace(told.ways[0], shift=0.5 * told.ways[0].shift),)
+        told,
+        segments=told.segments[:-1]
+        if len(told.segments) > 1
+        else (replace(told.segments[0], shift=0.5 * told.segments[0].shift),),
     )
     ways.judge(case, end)
     assert outcomes(case, "path") == {WRONG}
     # a platform turned until the legs' lines meet in a point, told as one way without singularity
     case.found.clear()
-    across = replace(told.ways[0], shift=0 * told.ways[0].shift, turn=np.array([0.0, 0.0, 3.0]))
+    across = replace(told.segments[0], shift=0 * told.segments[0].shift, turn=np.array([0.0, 0.0, 3.0]))
     ways.same(
         case,
-        replace(told, ways=(across,)),
+        replace(told, segments=(across,)),
         case.fitted(told.start.configuration),
         case.fitted(told.start.configuration),
-        case.directions(told.setting.observed),
+        case.directions(told.setup.observed),
     )
     assert outcomes(case, "path") == {WRONG}
 
@@ -247,11 +250,11 @@ def test_a_false_ending_is_found():
 
 def test_a_singular_pose_that_is_none_is_found():
     case = shipped("3rps")
-    told = hrsynth.singular(case.engine, points=20)
+    told = hrsynth.singularities(case.engine, points=20)
     loci.judge(case, told)
     assert outcomes(case, "singular pose") == {HELD}
     case.found.clear()
-    off = replace(told.examples[0], configuration=told.setting.everything.start)
+    off = replace(told.examples[0], configuration=told.setup.all_samples.start)
     loci.judge(case, replace(told, examples=(off,)))
     assert outcomes(case, "singular pose") == {WRONG}
     loci.judge(case, replace(told, condition=None, examples=()))

@@ -19,7 +19,7 @@ from hrsynth.analysis.advice import Advice, advise, candidates
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.verdict import BLIND, CONTROLLABLE, PARTIAL
 from hrsynth.description import load
-from hrsynth.description.sights import split_offers
+from hrsynth.description.observation_text import split_offers
 from hrsynth.errors import BadRequest, HrsynthError
 from hrsynth.geometry.vectors import Array, unit
 from hrsynth.mechanism import Mechanism, Observation
@@ -72,22 +72,22 @@ class Independent:
     def __init__(
         self, robot: Mechanism, observe: str | None, camera: str | None = None, seed: int = 1, *, at_zero: bool = False
     ) -> None:
-        setting = ObservedRobot.of(robot, observe, camera, samples=1)
-        self.everything = candidates(setting)
-        oracle = Oracle(setting.mechanism)
+        setup = ObservedRobot.of(robot, observe, camera, samples=1)
+        self.everything = candidates(setup)
+        oracle = Oracle(setup.mechanism)
         self.state = (
-            np.array([link.pose for link in setting.mechanism.links.values()])
+            np.array([link.pose for link in setup.mechanism.links.values()])
             if at_zero
             else list(oracle.random_walk(np.random.default_rng(seed), 2))[-1]
         )
         basis = oracle.kernel(self.state)[0]
-        point = setting.anatomy.point
-        twist = oracle.twist(basis, setting.mechanism.platform)
+        point = setup.decomposition.point
+        twist = oracle.twist(basis, setup.mechanism.platform)
         if point is not None:
-            arm = oracle.pose(self.state, setting.mechanism.platform)[:3, :3] @ point
+            arm = oracle.pose(self.state, setup.mechanism.platform)[:3, :3] @ point
             twist = twist[:3] + np.cross(twist[3:].T, arm).T
         self.twist = twist
-        self.seen = np.vstack(rate_rows(oracle, self.state, basis, setting.observed))
+        self.seen = np.vstack(rate_rows(oracle, self.state, basis, setup.observed))
         rows = rate_rows(oracle, self.state, basis, [each.observation for each in self.everything])
         self.rows = {name_of(each.observation): block for each, block in zip(self.everything, rows, strict=True)}
 
@@ -192,13 +192,13 @@ def test_parallel_rails_need_one_rail_or_one_line(robot: str) -> None:
     """The rods' directions do not see the translation along the rails: the position of any one rod, or the encoder of
     any one rail, does."""
     answer = found(robot)
-    setting = setting_of(robot)
+    setup = setting_of(robot)
     assert answer.now.verdict == PARTIAL
-    assert [freedom.name.startswith("translation along") for freedom in answer.now.lost] == [True]
-    rails = {j.name for j in setting.mechanism.joints_of(setting.mechanism.base) if j.type == "P"}
+    assert [freedom.name.startswith("translation along") for freedom in answer.now.unobserved] == [True]
+    rails = {j.name for j in setup.mechanism.joints_of(setup.mechanism.base) if j.type == "P"}
     assert singles(answer, "encoder") == rails
-    assert singles(answer, "line") == {o.link for o in setting.observed}
-    assert len(answer.sets) == len(answer.setting.observed) * 2
+    assert singles(answer, "line") == {o.link for o in setup.observed}
+    assert len(answer.sets) == len(answer.setup.observed) * 2
     assert all(m.actuated for each in answer.sets for m in each.measurements if m.kind == "encoder")
 
 
@@ -260,7 +260,7 @@ def test_the_record(robot: str) -> None:
     answer = found(robot)
     record = answer.to_dict()
     assert record["nothing_missing"] is False
-    assert record["rank"] + len(record["lost"]) == record["dof"]
+    assert record["rank"] + len(record["unobserved"]) == record["dof"]
     assert len(record["sets"]) == len(answer.sets) <= record["tried"]
     for each in record["sets"]:
         assert (each["verdict"], each["rank"]) == (CONTROLLABLE, record["dof"])
@@ -331,7 +331,7 @@ def test_nothing_helps(charm: bool) -> None:
     moves no platform is no help."""
     answer = advise(two_rods("U", charm))
     assert (answer.now.verdict, answer.now.rank, answer.now.dof) == (PARTIAL, 3, 4)
-    assert [freedom.name for freedom in answer.now.lost] == ["rotation about the line B1 B2"]
+    assert [freedom.name for freedom in answer.now.unobserved] == ["rotation about the line B1 B2"]
     assert not answer.sets
     assert not answer.cured
     assert not answer.nothing_missing
@@ -360,16 +360,16 @@ def test_in_small_batches_too(monkeypatch: pytest.MonkeyPatch, robot: str, obser
 @pytest.mark.parametrize("robot", ["3prp", "gough_stewart", "quattro", "3upu"])
 def test_motors_come_first(robot: str) -> None:
     """Legs, directions, lines, then encoders, those on joints with motors before the others."""
-    everything = candidates(setting_of(robot, ("1",)))
-    order = [("leg", "direction", "line", "encoder").index(each.kind) - bool(each.actuated) / 2 for each in everything]
+    all_samples = candidates(setting_of(robot, ("1",)))
+    order = [("leg", "direction", "line", "encoder").index(each.kind) - bool(each.actuated) / 2 for each in all_samples]
     assert order == sorted(order)
-    assert "1" not in {each.of for each in everything if each.kind == "leg"}
+    assert "1" not in {each.of for each in all_samples if each.kind == "leg"}
 
 
 def test_progress_and_the_public_name() -> None:
     told: list[str] = []
     assert hrsynth.advise is advise
-    with hrsynth.following(told.append):
+    with hrsynth.on_progress(told.append):
         advise(load("3prp"))
     assert {"sampling", "sets of 1", "sets of 2", "verification"} == set(told)
 
@@ -417,11 +417,11 @@ def test_no_set_that_sees_as_much_is_cheaper(price: str) -> None:
     told = hrsynth.advise("gough_stewart", ["1"], "eye=base@0.3,0.1,0", offer=offer, price=price)
     costs = {kind: float(number) for kind, _, number in (part.partition("=") for part in price.split(",") if part)}
     assert told.cured
-    paid = {each.price for each in told.sets}
+    paid = {each.cost for each in told.sets}
     assert max(paid) - min(paid) < 1e-9
     for each in told.sets[:3]:
         words = [costs.get("point" if m.kind == "offered" else m.kind, 1.0) for m in each.measurements]
-        assert each.price == pytest.approx(sum(words))
+        assert each.cost == pytest.approx(sum(words))
     for legs in range(3):
         for points in range(len(places) + 1):
             cost = legs * costs.get("leg", 1.0) + points * costs.get("point", 1.0)

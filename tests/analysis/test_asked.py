@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import hrsynth
-from hrsynth.analysis.asked import configurations_at
-from hrsynth.description import load, shipped
+from hrsynth.analysis.pose_requests import configurations_at
+from hrsynth.description import list_robots, load
 from hrsynth.errors import BadRequest, PoseNotReached
 from hrsynth.kinematics.configuration import measure
 from hrsynth.mechanism.pose import ModeNumber, Pose, asked_pose
@@ -22,22 +22,24 @@ ROBOTS = [
 
 @pytest.mark.parametrize(("name", "legs", "about"), ROBOTS)
 def test_a_mode_by_its_number_is_the_robot_assembled_there(name: str, legs: str | None, about: str):
-    setting = hrsynth.observe(load(shipped()[name]), legs)
-    listed = hrsynth.modes(setting, at=about)
+    setup = hrsynth.observe(load(list_robots()[name]), legs)
+    listed = hrsynth.modes(setup, at=about)
     numbers = [k for k, mode in enumerate(listed.modes, 1) if mode.configuration is not None]
     assert len(numbers) > 1
-    first, *found = configurations_at(setting, [Pose.parse(about), *(ModeNumber(k) for k in numbers)])
-    question = setting.samples.question
-    wanted = np.concatenate(measure(first.twin, first.q, question.reference, question.observations)[2])
+    first, *found = configurations_at(setup, [Pose.parse(about), *(ModeNumber(k) for k in numbers)])
+    observation_model = setup.samples.observation_model
+    wanted = np.concatenate(
+        measure(first.model, first.q, observation_model.reference, observation_model.observations)[2]
+    )
     for k, at in zip(numbers, found, strict=True):
-        assert at.twin is first.twin
-        assert str(listed.setting.motion.pose(at.pose(setting.motion.link))) == str(listed.modes[k - 1].pose)
-        got = np.concatenate(measure(at.twin, at.q, question.reference, question.observations)[2])
+        assert at.model is first.model
+        assert str(listed.setup.motion.pose(at.pose(setup.motion.link))) == str(listed.modes[k - 1].pose)
+        got = np.concatenate(measure(at.model, at.q, observation_model.reference, observation_model.observations)[2])
         assert np.abs(got - wanted).max() < 1e-9
 
 
 def test_every_command_takes_a_mode():
-    robot = load(shipped()["gough_stewart"])
+    robot = load(list_robots()["gough_stewart"])
     listed = hrsynth.modes(robot, "1,3,5")
     (posture,) = hrsynth.check(robot, "1,3,5", at=["mode:2"]).postures
     assert str(posture.pose) == str(listed.modes[1].pose)
@@ -47,25 +49,25 @@ def test_every_command_takes_a_mode():
     answer = hrsynth.path(robot, "1,3,5", start="mode:1", goal="mode:2")
     assert [str(end.pose) for end in (answer.start, answer.goal)] == [str(mode.pose) for mode in listed.modes]
     run = hrsynth.servo(robot, "1,3,5", start="mode:2", goal=str(listed.pose))
-    assert (run.ending.name, run.ending.matched) == ("mode", 2)
+    assert (run.run_outcome.name, run.run_outcome.matched) == ("mode", 2)
 
 
 @pytest.mark.some(1)
 @pytest.mark.parametrize(("name", "watched"), [("3rrr_m1", None), ("gough_stewart", "1,3,5"), ("quattro", "1,4")])
 def test_a_robot_is_observed_from_a_mode_on(name: str, watched: str | None):
     """The mode is its zero configuration: what ``derive`` and ``legs`` say holds about there, in the file's numbers."""
-    robot = load(shipped()[name])
-    setting = hrsynth.observe(robot, watched)
-    number = next(k for k, mode in enumerate(hrsynth.modes(setting).modes, 1) if mode.configuration and not mode.goal)
+    robot = load(list_robots()[name])
+    setup = hrsynth.observe(robot, watched)
+    number = next(k for k, mode in enumerate(hrsynth.modes(setup).modes, 1) if mode.configuration and not mode.goal)
     begun = hrsynth.observe(robot, watched, at=f"mode:{number}")
-    start, (there,) = begun.everything.start, configurations_at(setting, [ModeNumber(number)])
-    assert all(np.abs(start.pose(link) - there.pose(link)).max() < 1e-9 for link in setting.mechanism.links)
+    start, (there,) = begun.all_samples.start, configurations_at(setup, [ModeNumber(number)])
+    assert all(np.abs(start.pose(link) - there.pose(link)).max() < 1e-9 for link in setup.mechanism.links)
     assert hrsynth.derive(robot, watched, at=f"mode:{number}").to_dict() == hrsynth.derive(begun).to_dict()
     assert begun.robot.file == robot.file
 
 
 def test_legs_are_counted_from_a_mode_on():
-    robot = load(shipped()["3rrr_m1"])
+    robot = load(list_robots()["3rrr_m1"])
     assert hrsynth.legs(robot, at="mode:2").to_dict() == hrsynth.legs(hrsynth.observe(robot, at="mode:2")).to_dict()
     with pytest.raises(BadRequest, match="mode:1 to mode:2"):
         hrsynth.legs(robot, at="mode:3")
@@ -86,16 +88,16 @@ def test_legs_are_counted_from_a_mode_on():
 )
 def test_a_mode_that_there_is_not_is_refused(text: str, match: str):
     with pytest.raises(BadRequest, match=match):
-        hrsynth.check(load(shipped()["gough_stewart"]), "1,3,5", at=[text])
+        hrsynth.check(load(list_robots()["gough_stewart"]), "1,3,5", at=[text])
 
 
 def test_a_mode_that_is_not_assembled_is_not_reached():
-    setting = hrsynth.observe(load(shipped()["quattro"]), "1,4")
-    listed = hrsynth.modes(setting)
+    setup = hrsynth.observe(load(list_robots()["quattro"]), "1,4")
+    listed = hrsynth.modes(setup)
     lost = next((k for k, mode in enumerate(listed.modes, 1) if mode.configuration is None), None)
     if lost is not None:
         with pytest.raises(PoseNotReached, match="was not found assembled"):
-            configurations_at(setting, [ModeNumber(lost)])
+            configurations_at(setup, [ModeNumber(lost)])
 
 
 def test_texts_without_a_number_are_poses():

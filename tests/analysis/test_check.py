@@ -12,16 +12,16 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 import hrsynth
-from hrsynth.analysis import posture as posture_module
+from hrsynth.analysis import configuration_report as posture_module
 from hrsynth.analysis.check import MEASURES, UNREACHABLE, Check, check
-from hrsynth.analysis.classes import Counts, interaction_matrix, redundant_rows, surplus
+from hrsynth.analysis.configuration_report import ConfigurationAnalysis, ConfigurationReport
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.analysis.posture import ConfigurationAnalysis, Posture
+from hrsynth.analysis.singularity_indices import Counts, interaction_matrix, redundant_rows, surplus
 from hrsynth.description import load
 from hrsynth.geometry.ranks import CLEAN
 from hrsynth.geometry.vectors import Array, inverse
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.relation import Relation, relation
+from hrsynth.kinematics.velocity_relation import VelocityRelation, relation
 from hrsynth.mechanism import JointType, Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Limits
@@ -42,11 +42,11 @@ def at_zero(robot: str) -> Check:
     return check(load(robot))
 
 
-def check_identities(found: Posture) -> None:
+def check_identities(found: ConfigurationReport) -> None:
     for kinds in (found.hidden, found.real):
-        if kinds is None or kinds.classes is None:
+        if kinds is None or kinds.singularity_indices is None:
             continue
-        c = kinds.classes
+        c = kinds.singularity_indices
         assert c.IO == c.RI + c.RPM - c.IIM
         assert c.II == c.RO + c.RPM - c.IIM
         assert c.type3 == (c.type1 and c.type2)
@@ -79,38 +79,38 @@ def dims(basis: Array, twist_rows: int) -> tuple[int, int, int]:
 @pytest.mark.some(16)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_ranks_are_those_of_the_oracle(robot: str) -> None:
-    setting = setting_of(robot)
-    examiner, question = ConfigurationAnalysis(setting), setting.samples.question
-    oracle = Oracle(setting.mechanism)
-    for at in (setting.everything.start, *(m.configuration for m in setting.everything.members)):
+    setup = setting_of(robot)
+    examiner, observation_model = ConfigurationAnalysis(setup), setup.samples.observation_model
+    oracle = Oracle(setup.mechanism)
+    for at in (setup.all_samples.start, *(m.configuration for m in setup.all_samples.members)):
         found = examiner.examine(at)
         check_identities(found)
         assert found.decided
-        state = state_of(at.twin, at.q)
-        point = question.point is not None
-        seen = oracle.relation(state, question.observations, point_only=point)
+        state = state_of(at.model, at.q)
+        point = observation_model.point is not None
+        seen = oracle.relation(state, observation_model.observations, point_only=point)
         velocities, _ = oracle.kernel(state)
         assert found.mobility.total == velocities.shape[1]
-        whole, dof, _ = dims(seen, question.twist_rows)
+        whole, dof, _ = dims(seen, observation_model.twist_rows)
         assert found.dof == dof
-        assert len(found.hidden.lost) == whole - dims(seen, question.twist_rows)[2]
-        assert found.hidden.rank == dof - len(found.hidden.lost)
+        assert len(found.hidden.unobserved) == whole - dims(seen, observation_model.twist_rows)[2]
+        assert found.hidden.rank == dof - len(found.hidden.unobserved)
         assert found.real is not None
         t = oracle.twist(velocities, oracle.mechanism.platform)
         blocks = [t[:3] / oracle.length] if point else [t[:3] / oracle.length, t[3:]]
         moved = span(np.vstack([*blocks, motor_rates(oracle, state, velocities)]))
-        whole, dof, driven = dims(moved, question.twist_rows)
+        whole, dof, driven = dims(moved, observation_model.twist_rows)
         assert found.real.rank == dof - (whole - driven)
 
 
 @pytest.mark.parametrize("robot", ["delta", "gough_stewart", "3rrr_m1", "quattro", "prrrp_m1", "hexa"])
 def test_singular_values_are_those_of_the_oracle(robot: str) -> None:
     """The extreme ratios |u̇| / |t| over all motions, from the oracle's ρ."""
-    setting = setting_of(robot)
-    oracle, examiner = Oracle(setting.mechanism), ConfigurationAnalysis(setting)
-    for member in setting.everything.members:
+    setup = setting_of(robot)
+    oracle, examiner = Oracle(setup.mechanism), ConfigurationAnalysis(setup)
+    for member in setup.all_samples.members:
         at, distances = member.configuration, examiner.classify(member.configuration).distances
-        basis = oracle.relation(state_of(at.twin, at.q), setting.observed)
+        basis = oracle.relation(state_of(at.model, at.q), setup.observed)
         directions = np.linalg.svd(basis[:6], full_matrices=False)[0][:, : basis.shape[1]]
         values = np.linalg.svd(basis[6:] @ np.linalg.pinv(basis[:6]) @ directions, compute_uv=False)[: basis.shape[1]]
         assert distances.type2 == pytest.approx(values[-1], rel=1e-6)
@@ -118,7 +118,7 @@ def test_singular_values_are_those_of_the_oracle(robot: str) -> None:
         assert distances.condition == pytest.approx(values[0] / values[-1], rel=1e-6)
         error = np.hypot(distances.millimetres / (1e3 * oracle.length * np.radians(1)), distances.degrees)
         assert error == pytest.approx(1 / values[-1], rel=1e-6)
-        found = relation(at, setting.samples.question)
+        found = relation(at, setup.samples.observation_model)
         M = interaction_matrix(found)
         assert M is not None
         t = found.twist_part @ np.ones(found.dimension)
@@ -130,13 +130,13 @@ def test_singular_values_are_those_of_the_oracle(robot: str) -> None:
 def test_redundant_rows_add_up(robot: str) -> None:
     """All rows of the loops less their rank, at zero and at samples; what is redundant only here is what is lost."""
     examiner = ConfigurationAnalysis(setting_of(robot))
-    for at in (examiner.setting.everything.start, *(m.configuration for m in examiner.setting.everything.members)):
+    for at in (examiner.setup.all_samples.start, *(m.configuration for m in examiner.setup.all_samples.members)):
         rows = redundant_rows(at)
-        J = at.twin.jacobian(at.q)
+        J = at.model.jacobian(at.q)
         assert sum(count for _, count in rows) == len(J) - np.linalg.matrix_rank(J, tol=1e-8)
-        assert {name for name, _ in rows} == set(at.twin.loops)
+        assert {name for name, _ in rows} == set(at.model.loops)
         found = examiner.examine(at)
-        assert sum(each.rows for each in found.redundant) == found.hidden.classes.IIM
+        assert sum(each.rows for each in found.redundant) == found.hidden.singularity_indices.IIM
 
 
 def test_surplus_rows_stay_where_the_loss_stays() -> None:
@@ -170,9 +170,9 @@ def test_parallel_cranks_are_type_2() -> None:
     """Both cranks of the five-bar robot are parallel: the tip moves across them, both rods keep their direction."""
     (found,) = check(load("rrrrr_m1"), at=[f"x=0,y={0.16 + sqrt(0.2**2 - 0.1**2)!r}"]).postures
     assert found.hidden.state == "type2"
-    assert found.hidden.classes.to_dict() == {"RI": 0, "RO": 1, "II": 1, "IO": 0, "RPM": 0, "IIM": 0}
+    assert found.hidden.singularity_indices.to_dict() == {"RI": 0, "RO": 1, "II": 1, "IO": 0, "RPM": 0, "IIM": 0}
     assert found.real.state == "regular"
-    assert found.hidden.lost[0].name.startswith("translation along x")
+    assert found.hidden.unobserved[0].name.startswith("translation along x")
     assert found.distances.type2 == 0
     assert found.distances.condition is found.distances.millimetres is None
 
@@ -183,7 +183,7 @@ def test_a_stretched_leg_is_type_1() -> None:
     (found,) = check(load("rrrrr_m1"), at=[f"x={float(tip[0])!r},y={float(tip[1])!r}"]).postures
     assert found.hidden.state == found.real.state == "type1"
     for kinds in (found.hidden, found.real):
-        assert kinds.classes.to_dict() == {"RI": 1, "RO": 0, "II": 0, "IO": 1, "RPM": 0, "IIM": 0}
+        assert kinds.singularity_indices.to_dict() == {"RI": 1, "RO": 0, "II": 0, "IO": 1, "RPM": 0, "IIM": 0}
     assert found.dof == 1
     assert found.distances.type1 == 0
 
@@ -192,9 +192,9 @@ def test_rods_in_line_are_type_2_of_the_real_robot() -> None:
     """Both rods in line: the motors held, the tip moves across them; the directions still see it."""
     (found,) = check(load("rrrrr_m1"), at=[f"x=0,y={sqrt(0.16**2 - 0.1**2)!r}"]).postures
     assert found.real.state == "type2"
-    assert found.real.classes.to_dict() == {"RI": 0, "RO": 1, "II": 1, "IO": 0, "RPM": 0, "IIM": 0}
+    assert found.real.singularity_indices.to_dict() == {"RI": 0, "RO": 1, "II": 1, "IO": 0, "RPM": 0, "IIM": 0}
     assert found.hidden.state == "regular"
-    np.testing.assert_allclose(found.real.lost[0].twist[[0, 2, 3, 4]], 0, atol=1e-9)
+    np.testing.assert_allclose(found.real.unobserved[0].twist[[0, 2, 3, 4]], 0, atol=1e-9)
 
 
 def parallelogram(tilt: Array) -> Mechanism:
@@ -229,9 +229,9 @@ def test_a_flat_parallelogram_is_a_constraint_singularity(tilt: Array) -> None:
     check_identities(found)
     assert found.hidden.state == found.real.state == "constraint"
     assert found.constraint_singular is True
-    assert found.hidden.classes.IIM == 1
-    assert (found.mobility.total, found.dof, found.hidden.classes.IO) == (2, 2, -1)
-    assert found.real.classes.RO == 1
+    assert found.hidden.singularity_indices.IIM == 1
+    assert (found.mobility.total, found.dof, found.hidden.singularity_indices.IO) == (2, 2, -1)
+    assert found.real.singularity_indices.RO == 1
     assert [(each.rows, each.generic) for each in found.redundant] == [(1, False)]
     assert [each.rows for each in answer.redundant] == [3]
     assert any(abs(tilt[:, 2] @ freedom.twist[3:]) > 0.9 for freedom in found.gained)
@@ -241,8 +241,8 @@ def test_a_flat_parallelogram_is_a_constraint_singularity(tilt: Array) -> None:
 def test_gained_freedoms_are_those_beyond_the_usual_ones() -> None:
     """A platform that translates and, at some pose, also turns about z has gained the turn alone."""
 
-    def having(columns: list[int]) -> Relation:
-        return Relation(np.eye(6)[:, columns], 6, (), len(columns), CLEAN)
+    def having(columns: list[int]) -> VelocityRelation:
+        return VelocityRelation(np.eye(6)[:, columns], 6, (), len(columns), CLEAN)
 
     examiner = ConfigurationAnalysis(setting_of("delta"))
     gained = examiner._gained_twists(having([0, 1, 2, 5]))
@@ -254,14 +254,14 @@ def test_gained_freedoms_are_those_beyond_the_usual_ones() -> None:
 @given(parallel_robots())
 @quick
 def test_random_robots_obey_the_identities(mechanism: Mechanism) -> None:
-    setting = ObservedRobot.of(mechanism, samples=3)
-    examiner = ConfigurationAnalysis(setting)
-    for at in (setting.everything.start, *(m.configuration for m in setting.everything.members)):
+    setup = ObservedRobot.of(mechanism, samples=3)
+    examiner = ConfigurationAnalysis(setup)
+    for at in (setup.all_samples.start, *(m.configuration for m in setup.all_samples.members)):
         found = examiner.examine(at)
         check_identities(found)
-        counts = Counts.of(relation(at, setting.samples.question))
+        counts = Counts.of(relation(at, setup.samples.observation_model))
         assert counts.relation == counts.dof + counts.unexplained == counts.seen + counts.unseen
-        assert found.mobility.total >= found.mobility.idle >= 0
+        assert found.mobility.total >= found.mobility.internal >= 0
 
 
 @pytest.mark.parametrize("robot", ["rrrrr_m1", "3rrr_m1"])
@@ -292,8 +292,8 @@ def test_a_pose_beyond_joint_limits_says_so() -> None:
         joints=[replace(joint, limits=Limits(-1e-3, 1e-3)) for joint in robot.joints.values() if joint.actuated]
     )
     (at,), (home,) = (check(made, at=poses).postures for poses in (["x=0.05,y=0,phi=0"], []))
-    assert set(at.to_dict()["beyond"]) == {name for name, joint in robot.joints.items() if joint.actuated}
-    assert home.beyond == ()
+    assert set(at.to_dict()["beyond_limits"]) == {name for name, joint in robot.joints.items() if joint.actuated}
+    assert home.beyond_limits == ()
 
 
 def test_a_grid_marks_what_is_out_of_reach_and_singular() -> None:
@@ -304,7 +304,7 @@ def test_a_grid_marks_what_is_out_of_reach_and_singular() -> None:
 
 def test_fewer_legs_and_a_camera() -> None:
     one = check(load("gough_stewart"), ["1", "2"]).postures[0]
-    assert (one.hidden.rank, len(one.hidden.lost), one.hidden.state) == (4, 2, "regular")
+    assert (one.hidden.rank, len(one.hidden.unobserved), one.hidden.state) == (4, 2, "regular")
     assert one.distances.condition is not None
     assert one.real.rank == 6
     carried = check(load("gough_stewart"), camera="platform")
@@ -330,7 +330,7 @@ def test_a_rank_that_is_not_clear_is_no_verdict(monkeypatch: pytest.MonkeyPatch)
     (found,) = check(load("3rrr_m1")).postures
     record = found.to_dict()
     assert not found.decided
-    assert record["type1"] is record["type2"] is record["type3"] is record["classes"] is None
+    assert record["type1"] is record["type2"] is record["type3"] is record["singularity_indices"] is None
     assert record["constraint"]["singular"] is None
     assert found.hidden.state == "undecided"
 
@@ -341,13 +341,13 @@ def test_the_singular_pose_really_moves() -> None:
     answer = check(load("rrrrr_m1"), at=[pose])
     at: ClosedConfiguration = answer.postures[0].configuration
     kernel, _ = at.kernel()
-    rows = answer.setting.samples.question.rows(at) @ kernel
+    rows = answer.setup.samples.observation_model.rows(at) @ kernel
     lost = kernel @ np.linalg.svd(rows[6:])[2][-1]
     h = 1e-5
-    ahead, behind = (ClosedConfiguration(at.twin, at.twin.integrate(at.q, s * h * lost), 0.0) for s in (1, -1))
+    ahead, behind = (ClosedConfiguration(at.model, at.model.integrate(at.q, s * h * lost), 0.0) for s in (1, -1))
     moved = inverse(behind.pose("dist_1")) @ ahead.pose("dist_1")
     assert np.linalg.norm(moved[:3, 3]) > 1e-6
-    target = answer.setting.samples.question.target
+    target = answer.setup.samples.observation_model.target
     for (_, a), (_, b) in zip(target(ahead).measured, target(behind).measured, strict=True):
         np.testing.assert_allclose(a, b, atol=1e-8)
 

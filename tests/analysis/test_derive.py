@@ -15,11 +15,11 @@ import hrsynth
 from hrsynth.analysis.derive import STEP_SAMPLES, Derivation, derive
 from hrsynth.analysis.observed import SAMPLES
 from hrsynth.analysis.verdict import BLIND, CONTROLLABLE, PARTIAL
+from hrsynth.catalog.architecture_key import parse
 from hrsynth.catalog.geometry import mechanism as catalog_mechanism
-from hrsynth.catalog.words import parse
 from hrsynth.description import load, native
-from hrsynth.errors import BadRequest, NotCertified
-from hrsynth.kinematics.certificate import Certificate, certify
+from hrsynth.errors import BadRequest, NoEquivalentRobot
+from hrsynth.kinematics.equivalence import EquivalenceCheck, check_equivalence
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism.model import JointType
 from hrsynth.mechanism.observations.direction import Direction
@@ -81,26 +81,26 @@ EXPECTED = {
 
 def certified(derivation: Derivation) -> None:
     """The certificate passed, with evidence."""
-    certificate = derivation.certificate
+    certificate = derivation.equivalence
     assert certificate.passed
     assert certificate.samples == SAMPLES
     assert certificate.largest_angle < SAME_RELATION
     assert certificate.residual < FOLLOWED
     assert certificate.smallest_gap > RANK_GAP
     assert derivation.verdict.gap > RANK_GAP
-    assert derivation.verdict.rank + len(derivation.verdict.lost) == derivation.dof
+    assert derivation.verdict.rank + len(derivation.verdict.unobserved) == derivation.dof
 
 
 def emitted(derivation: Derivation) -> None:
     """The hidden robot is a file that others can load, of the real robot's links where they are kept."""
-    hidden, setting = derivation.hidden, derivation.setting
+    hidden, setup = derivation.hidden, derivation.setup
     assert hidden is not None
     text = native.write(hidden)
     again = native.parse(text)
     assert again.differences(hidden) == []
     assert hidden.differences(again) == []
-    twin = PinocchioModel(again)
-    assert np.linalg.norm(twin.residual(twin.q0)) < ASSEMBLED
+    robot_model = PinocchioModel(again)
+    assert np.linalg.norm(robot_model.residual(robot_model.q0)) < ASSEMBLED
     assert Oracle(again).error(Oracle(again).zero()) < 1e-11
 
     model = pin.buildModelFromXML(text)
@@ -114,20 +114,20 @@ def emitted(derivation: Derivation) -> None:
     for name, link in hidden.links.items():
         np.testing.assert_allclose(data.oMf[model.getFrameId(name)].homogeneous, link.pose, atol=1e-9)
 
-    real = setting.mechanism
-    assert hidden.name == f"{setting.robot.name}_hidden"
+    real = setup.mechanism
+    assert hidden.name == f"{setup.robot.name}_hidden"
     assert (hidden.base, hidden.platform, hidden.reference) == (real.base, real.platform, real.reference)
     for name in hidden.links.keys() & real.links.keys():
         np.testing.assert_array_equal(hidden.links[name].pose, real.links[name].pose)
     assert hidden.platform in real.links
     actuated = [joint for joint in hidden.joints.values() if joint.actuated]
     assert actuated
-    assert all(joint.name not in setting.robot.joints for joint in actuated)
+    assert all(joint.name not in setup.robot.joints for joint in actuated)
     assert all(joint.name not in real.joints for joint in actuated)
     assert {joint.type for joint in actuated} <= {JointType.REVOLUTE, JointType.UNIVERSAL}
-    assert [(o.leg, o.link) for o in hidden.observations] == [(o.leg, o.link) for o in setting.observed]
-    assert {o.leg for o in hidden.observations} <= set(setting.anatomy.labels)
-    for mine, theirs in zip(hidden.observations, setting.observed, strict=True):
+    assert [(o.leg, o.link) for o in hidden.observations] == [(o.leg, o.link) for o in setup.observed]
+    assert {o.leg for o in hidden.observations} <= set(setup.decomposition.labels)
+    for mine, theirs in zip(hidden.observations, setup.observed, strict=True):
         assert isinstance(mine, Direction)
         assert isinstance(theirs, Direction)
         assert mine.link in real.links
@@ -144,20 +144,20 @@ def test_all_legs_observed(robot: str) -> None:
     derivation, expected = derived(robot), EXPECTED[robot]
     assert derivation.architecture.ascii == expected.real
     assert derivation.dof == expected.dof
-    assert (derivation.mobility.total, derivation.mobility.idle) == expected.mobility
+    assert (derivation.mobility.total, derivation.mobility.internal) == expected.mobility
     certified(derivation)
     lost = len(expected.lost)
     assert derivation.verdict.verdict == (CONTROLLABLE if not lost else BLIND if lost == expected.dof else PARTIAL)
-    assert tuple(freedom.name for freedom in derivation.verdict.lost) == expected.lost
+    assert tuple(freedom.name for freedom in derivation.verdict.unobserved) == expected.lost
     if expected.hidden is None:
         assert derivation.hidden is None
         assert derivation.hidden_architecture is None
         assert derivation.unchecked is None
-        assert "vanishes" in derivation.certificate.reason
+        assert "vanishes" in derivation.equivalence.reason
         return
     assert derivation.hidden_architecture is not None
     assert derivation.hidden_architecture.ascii == expected.hidden
-    assert derivation.certificate.reason == ""
+    assert derivation.equivalence.reason == ""
     assert derivation.unchecked is not None
     assert derivation.unchecked.equivalent
     assert derivation.unchecked.hidden == derivation.hidden_architecture
@@ -169,8 +169,8 @@ def test_all_legs_observed(robot: str) -> None:
 def test_translations_along_the_slides_are_lost(robot: str) -> None:
     """Parallel P joints next to the base: no direction changes when all of them move alike (MMT 4.2.3)."""
     derivation = derived(robot)
-    rails = [j.axis for j in derivation.setting.mechanism.joints.values() if j.actuated]
-    (lost,) = derivation.verdict.lost
+    rails = [j.axis for j in derivation.setup.mechanism.joints.values() if j.actuated]
+    (lost,) = derivation.verdict.unobserved
     assert lost.twist.shape == (6,)
     np.testing.assert_allclose(lost.twist[3:], 0, atol=1e-12)
     for axis in rails:
@@ -232,7 +232,7 @@ def test_pairs_and_triples_of_a_pod_are_certified(robot: str, legs: tuple[str, .
         return
     assert derivation.verdict.verdict == PARTIAL
     assert derivation.verdict.rank == 4
-    assert f"rotation about the line B{legs[0]} B{legs[1]}" in [each.name for each in derivation.verdict.lost]
+    assert f"rotation about the line B{legs[0]} B{legs[1]}" in [each.name for each in derivation.verdict.unobserved]
     assert hidden.ascii.startswith("2-U*PS")
 
 
@@ -257,7 +257,7 @@ def test_architectures_of_the_papers(robot: str, legs: tuple[str, ...], hidden: 
     assert derivation.verdict.verdict == CONTROLLABLE
     assert derivation.unchecked is not None
     assert derivation.unchecked.equivalent
-    removed = set(derivation.setting.anatomy.labels) - set(legs)
+    removed = set(derivation.setup.decomposition.labels) - set(legs)
     assert {step.leg for step in derivation.steps if step.rule == "leg removal" and step.accepted} >= removed
 
 
@@ -275,11 +275,13 @@ def test_architectures_of_the_papers(robot: str, legs: tuple[str, ...], hidden: 
 def test_steps_are_those_that_are_taken_one_by_one(robot: str, legs: tuple[str, ...]) -> None:
     """The result alone is compared while a hidden robot is found; each step's own angle is measured afterwards."""
     found = derived(robot, legs)
-    samples = found.setting.samples
+    samples = found.setup.samples
     checked = SIMPLIFIED(
         Rewriting.of(
-            Evidence(found.setting.anatomy, samples),
-            lambda mechanism, bodies: certify(samples, mechanism, count=STEP_SAMPLES, bodies=bodies, complete=False),
+            Evidence(found.setup.decomposition, samples),
+            lambda mechanism, bodies: check_equivalence(
+                samples, mechanism, count=STEP_SAMPLES, bodies=bodies, complete=False
+            ),
         )
     )
     assert found.steps == checked.steps
@@ -313,7 +315,7 @@ def test_one_leg_of_a_delta_needs_another() -> None:
 def test_of_proposals_that_were_taken_back_the_first_is_printed() -> None:
     """All are in the record; the text says how many more there were, and has each attempt that counted."""
     derivation = derived("delta", ("1",))
-    proposals = [step for step in derivation.steps if step.rule == "end change" and step.taken_back]
+    proposals = [step for step in derivation.steps if step.rule == "end change" and step.discarded]
     printed = str(derivation).splitlines()
     assert len(proposals) > 3
     assert all(not step.accepted and "taken back" in step.reason for step in proposals)
@@ -358,9 +360,9 @@ def test_unobserved_legs_near_a_fold(seed: int) -> None:
 
 def test_nothing_is_answered_without_a_certificate(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where even the lift is refused no leg is called blind."""
-    refused = Certificate(3, 0, 1.0, 1e9, 0.0, False, "refused")
+    refused = EquivalenceCheck(3, 0, 1.0, 1e9, 0.0, False, "refused")
     monkeypatch.setattr("hrsynth.analysis.derive.certify", lambda *args, **options: refused)
-    with pytest.raises(NotCertified) as caught:
+    with pytest.raises(NoEquivalentRobot) as caught:
         derive(load("3rrr_m1"))
     assert caught.value.exit_status == 3
 
@@ -404,7 +406,7 @@ def test_other_segments(robot: str, observe: tuple[str, ...]) -> None:
     derivation = derived(robot, observe)
     certified(derivation)
     emitted(derivation)
-    links = {o.link for o in derivation.setting.observed}
+    links = {o.link for o in derivation.setup.observed}
     assert {each for each in observe if not each.isdigit()} <= links
     assert len(links) == len(observe)
 
@@ -459,7 +461,7 @@ def test_the_general_form_keeps_the_legs_that_are_not_observed() -> None:
 
 def test_the_same_seed_gives_the_same_answer() -> None:
     one = derive(load("3rrr_m1"), ["1", "2"], seed=4)
-    hrsynth.forget()
+    hrsynth.clear_cache()
     two = derive(load("3rrr_m1"), ["1", "2"], seed=4)
     assert one is not two
     assert one.to_dict() == two.to_dict()
@@ -470,7 +472,7 @@ def test_the_same_seed_gives_the_same_answer() -> None:
 
 def test_progress_is_told() -> None:
     told: list[str] = []
-    with hrsynth.following(told.append):
+    with hrsynth.on_progress(told.append):
         derive(load("rrrrr_m1"))
     assert {"sampling", "certificate", "the unchecked form"} <= set(told)
 
@@ -497,7 +499,7 @@ def test_bad_requests(observe: list[str] | None, camera: str | None, form: str, 
 
 def test_the_record() -> None:
     record = derived("delta", ("1",)).to_dict()
-    seen = derived("delta", ("1",)).setting.observed[0]
+    seen = derived("delta", ("1",)).setup.observed[0]
     assert isinstance(seen, Direction)
     axis = seen.direction.tolist()
     assert record["observed"] == [
@@ -505,13 +507,13 @@ def test_the_record() -> None:
     ]
     assert record["camera"] == "base"
     assert record["verdict"] == PARTIAL
-    assert record["dof"] == record["rank"] + len(record["lost"])
+    assert record["dof"] == record["rank"] + len(record["unobserved"])
     assert record["mobility"]["total"] == 9
-    assert record["mobility"]["idle"] == 6
-    assert record["certificate"]["passed"] is True
+    assert record["mobility"]["internal"] == 6
+    assert record["equivalence"]["passed"] is True
     assert record["notation"]["real_ascii"] == "3-R*-{2-SS}"
     assert record["unchecked_form"]["equivalent"] is False
-    assert all(len(freedom["twist"]) == 6 for freedom in record["lost"])
+    assert all(len(freedom["twist"]) == 6 for freedom in record["unobserved"])
     assert {step["rule"] for step in record["steps"]} >= {"motors off", "lift", "takeover", "leg removal", "keep"}
 
 
@@ -532,10 +534,10 @@ def test_a_zero_configuration_that_shows_fewer_freedoms_is_named():
     """How fast the watched rods of a 3-RRR turn, by hand: of the platform's three freedoms they show two there."""
     assert derived("3rrr_m1").verdict.rank_at_zero is None
     assert "rank_at_zero" not in derived("3rrr_m1").to_dict()
-    checked = hrsynth.singular("3rrr_m1", points=5).checked
+    checked = hrsynth.singularities("3rrr_m1", points=5).checked
     assert checked is not None
     at = checked.on_locus[0]
-    robot = at.twin.mechanism
+    robot = at.model.mechanism
 
     def place(joint: str) -> np.ndarray:
         link = robot.joints[joint].predecessor

@@ -25,13 +25,13 @@ from hrsynth.errors import HrsynthError
 from hrsynth.geometry.vectors import Array, frozen, unit
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
-from hrsynth.kinematics.relation import Measurement, relation
+from hrsynth.kinematics.velocity_relation import ObservationModel, relation
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
+from hrsynth.mechanism.incidences import DirectionSource, Incidences
 from hrsynth.mechanism.model import Coupling
 from hrsynth.mechanism.observation import Observation
 from hrsynth.mechanism.observations.direction import Direction
-from hrsynth.mechanism.relations import DirectionSource, Relations
 from hrsynth.mechanism.sensors import encoders
 from hrsynth.present.text import robots as text
 from kinematics.robots import ROBOTS, setting_of
@@ -41,9 +41,9 @@ from strategies import parallel_robots, planar, random_rotation, spherical, tran
 WORDS = (CONTROLLABLE, PARTIAL, BLIND)
 
 
-def sets(setting: ObservedRobot) -> Iterator[tuple[tuple[int, ...], list[Observation]]]:
+def sets(setup: ObservedRobot) -> Iterator[tuple[tuple[int, ...], list[Observation]]]:
     """All sets of default segments: their places and themselves."""
-    segments = setting.everything.question.observations[: setting.defaults]
+    segments = setup.all_samples.observation_model.observations[: setup.defaults]
     for size in range(1, len(segments) + 1):
         for places in combinations(range(len(segments)), size):
             yield places, [segments[i] for i in places]
@@ -66,16 +66,16 @@ def checked(verdict: ExactVerdict) -> None:
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_exact_ranks_are_the_numerical_ones(robot: str) -> None:
     """Every shipped robot, every set of legs."""
-    setting = setting_of(robot)
-    generic = architecture(setting)
-    for places, observed in sets(setting):
+    setup = setting_of(robot)
+    generic = architecture(setup)
+    for places, observed in sets(setup):
         verdict = generic.verdict(observed)
         checked(verdict)
         assert verdict.exact, verdict.reason
-        assert verdict.rank == select_relation(setting.everything.members[0].relation, places).rank
+        assert verdict.rank == select_relation(setup.all_samples.members[0].relation, places).rank
 
 
-def placed(mechanism: Mechanism, relations: Relations, drawn: Geometry) -> Mechanism:
+def placed(mechanism: Mechanism, relations: Incidences, drawn: Geometry) -> Mechanism:
     """A mechanism of doubles with the geometry of an instance."""
     centres = np.array([[float(x.p) / float(x.q) for x in point] for point in drawn.centres])
     directions = [unit(doubles(d)) for d in drawn.directions]
@@ -107,11 +107,11 @@ def doubles(vector: object) -> Array:
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_an_instance_is_a_mechanism_of_the_same_kind(robot: str) -> None:
     """The oracle, given the instance's geometry in doubles, finds the same dimensions as exact arithmetic."""
-    setting = setting_of(robot)
-    generic = architecture(setting)
+    setup = setting_of(robot)
+    generic = architecture(setup)
     drawn = draw(generic.relations, random.Random(0))
     exact = generic.instance(0)
-    mechanism = placed(setting.mechanism, generic.relations, drawn)
+    mechanism = placed(setup.mechanism, generic.relations, drawn)
     observations = [
         Direction(o.leg, o.link, mechanism.links[o.link].pose[:3, :3].T @ doubles(observed_direction(sight, drawn)))
         for o, sight in zip(generic.observations, generic.relations.sights, strict=True)
@@ -170,8 +170,10 @@ def test_a_mechanism_without_centres() -> None:
     builder.observe("1", "two", (1, 2, 3))
     robot = builder.build(platform="two")
     start = ClosedConfiguration.of(PinocchioModel(robot), PinocchioModel(robot).q0)
-    question = Measurement("two", None, "base", robot.observations)
-    verdict = architecture_of(robot, question, [start], relation(start, question)).verdict(robot.observations)
+    observation_model = ObservationModel("two", None, "base", robot.observations)
+    verdict = architecture_of(robot, observation_model, [start], relation(start, observation_model)).verdict(
+        robot.observations
+    )
     assert (verdict.exact, verdict.verdict, verdict.rank) == (True, BLIND, 0)
 
 
@@ -205,15 +207,15 @@ def test_kernels_are_exact(rows: list[list[int]]) -> None:
 def check_agreement(mechanism: Mechanism) -> None:
     """Exact ranks are those of a random robot, or there is a reason."""
     try:
-        setting = ObservedRobot.of(mechanism, samples=3)
+        setup = ObservedRobot.of(mechanism, samples=3)
     except HrsynthError:
         assume(False)
-    generic = architecture(setting)
-    for places, observed in sets(setting):
+    generic = architecture(setup)
+    for places, observed in sets(setup):
         verdict = generic.verdict(observed)
         checked(verdict)
         assert verdict.exact, verdict.reason
-        assert verdict.rank == max(select_relation(m.relation, places).rank for m in setting.everything.members)
+        assert verdict.rank == max(select_relation(m.relation, places).rank for m in setup.all_samples.members)
 
 
 @given(parallel_robots(), st.integers(0, 2**32 - 1))
@@ -232,20 +234,20 @@ def test_spherical_robots(seed: int) -> None:
 def spinning() -> ObservedRobot:
     """A robot with rods between balls, the direction seen of the first not along the rod: it moves as the rod spins."""
     robot = setting_of("delta").mechanism
-    first, *rest = setting_of("delta").everything.question.observations
+    first, *rest = setting_of("delta").all_samples.observation_model.observations
     assert isinstance(first, Direction)
     tilted = replace(first, direction=unit(first.direction + [0.3, -0.5, 0.4]))
     return ObservedRobot.of(robot.changed(observations=(tilted, *rest)), samples=3)
 
 
 def test_directions_that_move_while_the_platform_rests() -> None:
-    setting = spinning()
-    assert setting.everything.members[0].relation.RI == 1
-    generic = architecture(setting)
-    for places, observed in sets(setting):
+    setup = spinning()
+    assert setup.all_samples.members[0].relation.RI == 1
+    generic = architecture(setup)
+    for places, observed in sets(setup):
         verdict = generic.verdict(observed)
         assert verdict.exact
-        assert verdict.rank == select_relation(setting.everything.members[0].relation, places).rank
+        assert verdict.rank == select_relation(setup.all_samples.members[0].relation, places).rank
 
 
 def test_what_some_legs_leave_free_must_be_the_robots_own() -> None:
@@ -282,11 +284,11 @@ def test_many_random_robots(mechanism: Mechanism) -> None:
     ],
 )
 def test_other_segments_and_cameras(robot: str, observe: tuple[str, ...] | None, camera: str | None) -> None:
-    setting = setting_of(robot, observe, camera)
-    verdict = architecture(setting).verdict(setting.observed)
+    setup = setting_of(robot, observe, camera)
+    verdict = architecture(setup).verdict(setup.observed)
     checked(verdict)
     assert verdict.exact, verdict.reason
-    assert verdict.rank == max(member.relation.rank for member in setting.samples.members)
+    assert verdict.rank == max(member.relation.rank for member in setup.samples.members)
 
 
 # --- what must not be claimed ------------------------------------------------------------------------------------
@@ -304,13 +306,13 @@ def check_refused(generic: ExactArchitecture, words: str) -> None:
 def test_axes_that_are_not_quite_parallel() -> None:
     """A joint with its axis off by 1e-4 is locked: no planar robot any more, neither in fact nor in its instances."""
     robot = planar(["RRR"] * 3, np.random.default_rng(1), [{0}] * 3)
-    question = ObservedRobot.of(robot, samples=2).everything.question
-    mobile = relation(ClosedConfiguration.of(PinocchioModel(robot), PinocchioModel(robot).q0), question)
+    observation_model = ObservedRobot.of(robot, samples=2).all_samples.observation_model
+    mobile = relation(ClosedConfiguration.of(PinocchioModel(robot), PinocchioModel(robot).q0), observation_model)
     joint = robot.joints["joint_2_2"]
     bent = robot.changed(joints=[replace(joint, axes=(unit(joint.axis + 1e-4 * np.array([0.3, -0.5, 0.7])),))])
-    twin = PinocchioModel(bent)
-    start = ClosedConfiguration.of(twin, twin.q0)
-    check_refused(architecture_of(bent, question, [start], mobile), "mobility is 3, but")
+    model = PinocchioModel(bent)
+    start = ClosedConfiguration.of(model, model.q0)
+    check_refused(architecture_of(bent, observation_model, [start], mobile), "mobility is 3, but")
     found = legs(bent)
     assert found.dof == 2
     assert all(each.exact and each.rank == other.rank for each, other in zip(found.exact, found.sets, strict=True))
@@ -331,12 +333,12 @@ def test_six_rods_that_meet_one_line() -> None:
         builder.joint(f"tip_{number}", "S", f"rod_{number}", "platform", B, loop=number > 0)
         builder.observe(str(number + 1), f"rod_{number}", along)
     robot = builder.build(platform="platform")
-    twin = PinocchioModel(robot)
-    start = ClosedConfiguration.of(twin, twin.q0)
-    question = Measurement("platform", None, "base", robot.observations)
-    here = relation(start, question)
+    model = PinocchioModel(robot)
+    start = ClosedConfiguration.of(model, model.q0)
+    observation_model = ObservationModel("platform", None, "base", robot.observations)
+    here = relation(start, observation_model)
     assert here.dof.value == 1
-    check_refused(architecture_of(robot, question, [start], here), "mobility is 7, but 6")
+    check_refused(architecture_of(robot, observation_model, [start], here), "mobility is 7, but 6")
 
 
 def test_another_dof() -> None:
@@ -366,9 +368,9 @@ def test_relations_that_leave_no_direction() -> None:
 
 
 def test_what_is_no_direction() -> None:
-    setting = setting_of("delta")
-    joint = next(joint for joint in setting.mechanism.joints.values() if joint.type.value == "R")
-    verdict = architecture(setting).verdict(encoders(setting.mechanism, joint, "1"))
+    setup = setting_of("delta")
+    joint = next(joint for joint in setup.mechanism.joints.values() if joint.type.value == "R")
+    verdict = architecture(setup).verdict(encoders(setup.mechanism, joint, "1"))
     checked(verdict)
     assert not verdict.exact
     assert "not a direction" in verdict.reason

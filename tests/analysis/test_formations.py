@@ -19,20 +19,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hrsynth.analysis.asked import observe
 from hrsynth.analysis.check import check
 from hrsynth.analysis.controllability import _smallest, legs
 from hrsynth.analysis.derive import Derivation, derive
-from hrsynth.analysis.singularity.singular import singular
+from hrsynth.analysis.pose_requests import observe
+from hrsynth.analysis.singularity.singularities import singularities
 from hrsynth.certificates import certificate, verify
 from hrsynth.description import load, native, save
 from hrsynth.errors import BadRequest, BadRobotFile
 from hrsynth.families.formations import MOVES, formation
 from hrsynth.geometry.vectors import Array, pose
+from hrsynth.mechanism.cameras import NamedCamera
 from hrsynth.mechanism.model import Mechanism
 from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.mechanism.observations.point import ImagePoint
-from hrsynth.mechanism.sights import NamedCamera
 from hrsynth.present.show import text
 from hrsynth.present.text.sentences import describe_seen
 from hrsynth.present.text.tables import LINE, head
@@ -110,7 +110,7 @@ def test_generic_ranks_of_complete_formations_are_those_of_the_literature(bodies
     assert found.verdict.formation is not None
     assert len(found.verdict.formation.trivial) == trivial
     assert not found.verdict.formation.flexes
-    assert found.certificate.passed
+    assert found.equivalence.passed
     assert (found.exact.verdict, found.exact.rank, found.exact.trivial) == ("rigid", found.verdict.rank, trivial)
 
 
@@ -175,7 +175,7 @@ def test_a_ring_of_five_has_one_flex_that_is_named():
     moving = [int(link[1:]) - 1 for link in flex.links]
     assert 9 - rank(matrix[:, [3 * b + k for b in moving for k in range(3)]]) == 1
     assert "1 motion" in flex.name
-    assert flex.name in describe_seen(found.verdict, found.setting.labels, found.setting)
+    assert flex.name in describe_seen(found.verdict, found.setup.labels, found.setup)
     assert flex.name in text(found)
 
 
@@ -275,7 +275,7 @@ def test_the_search_for_the_smallest_sets_is_that_of_all_sets(seed: int):
 @pytest.mark.slow
 def test_ten_observations_that_are_all_needed_are_told_without_all_their_sets(page: str):
     found = legs(native.parse(page))
-    labels = tuple(each.leg for each in found.setting.observed)
+    labels = tuple(each.leg for each in found.setup.observed)
     assert found.minimal == (labels,)
     assert found.minimal_complete
     assert not found.complete
@@ -316,8 +316,8 @@ def test_a_formation_on_one_line_is_singular_and_told_so():
     assert lost == 1
     posture = check(formation(places, pairs, bodies="position")).postures[0]
     assert posture.hidden.state == "type2"
-    assert posture.hidden.classes is not None
-    assert lost == posture.hidden.classes.RO
+    assert posture.hidden.singularity_indices is not None
+    assert lost == posture.hidden.singularity_indices.RO
     assert posture.formation is not None
     assert posture.formation.verdict == "flexible"
     assert "on one line" in posture.formation.special
@@ -355,7 +355,7 @@ def test_the_hidden_robot_of_a_ring_is_read_again(tmp_path, bodies: str):
     back = load(tmp_path / "hidden.urdf")
     assert (back.formation, back.platform) == (False, "b1")
     found = derive(back)
-    assert found.certificate.passed
+    assert found.equivalence.passed
     assert found.verdict.dof == FREEDOMS[bodies]
 
 
@@ -366,7 +366,7 @@ def test_a_robot_in_a_formation_and_a_fixed_base():
     assert formed is not None
     assert formed.bodies == ("hand", "other_hand", "drone")
     assert formed.verdict == "flexible"
-    assert found.certificate.passed
+    assert found.equivalence.passed
     assert any(flex.links == ("other_hand",) and flex.count == 1 for flex in formed.flexes)
 
 
@@ -453,7 +453,7 @@ def test_poses_of_a_formation_are_refused():
 
 def test_other_questions_refuse_formations_in_one_line():
     with pytest.raises(BadRequest, match="formation"):
-        singular(drawn(3, "position", [(1, 2), (2, 3), (1, 3)])[0])
+        singularities(drawn(3, "position", [(1, 2), (2, 3), (1, 3)])[0])
     with pytest.raises(BadRequest, match="two of 1 to 3"):
         formation(np.eye(3), [(1, 4)])
     with pytest.raises(BadRequest, match="yaw"):

@@ -14,19 +14,19 @@ from hypothesis import strategies as st
 from hrsynth.analysis import instances
 from hrsynth.analysis.exact import TESTS, ExactArchitecture, architecture, architecture_of
 from hrsynth.analysis.instances import Instance, draw, instance, ranks_at
-from hrsynth.analysis.kept import are_kept, degree
+from hrsynth.analysis.loop_invariants import are_kept, degree
 from hrsynth.analysis.observed import ObservedRobot, select_relation
 from hrsynth.analysis.verdict import CONTROLLABLE, PARTIAL
+from hrsynth.catalog.architecture_key import parse
 from hrsynth.catalog.geometry import mechanism as built
-from hrsynth.catalog.words import parse
 from hrsynth.description import load
 from hrsynth.errors import HrsynthError
 from hrsynth.geometry.vectors import rotation_about
-from hrsynth.kinematics.relation import relation
+from hrsynth.kinematics.velocity_relation import relation
 from hrsynth.mechanism import Direction, Mechanism
 from hrsynth.mechanism.builder import Builder
-from hrsynth.mechanism.carried import carried_by_joints, ties
-from hrsynth.mechanism.relations import Relations
+from hrsynth.mechanism.incidences import Incidences
+from hrsynth.mechanism.structural_incidences import carried_by_joints, ties
 from kinematics.robots import ROBOTS, setting_of
 from mechanism.relating import miss, observed, recognised, walked
 from oracle import NotAssembled, Undecided
@@ -36,7 +36,7 @@ POD = "(Pk*-Utn-Unt)+(Pz*-2SSt)+(Pz*-Utn-S)+(Rt*-2SSt)"
 """Its P axes of legs 2 and 3 are parallel: the two never see the translation along them."""
 
 
-def one_of(mechanism: Mechanism, relations: Relations, seed: int = 0) -> Instance:
+def one_of(mechanism: Mechanism, relations: Incidences, seed: int = 0) -> Instance:
     """A random instance of relations."""
     directions = [o for o in mechanism.observations if isinstance(o, Direction)]
     return instance(mechanism, relations, directions, draw(relations, random.Random(seed)))
@@ -47,10 +47,10 @@ def one_of(mechanism: Mechanism, relations: Relations, seed: int = 0) -> Instanc
 def test_all_relations_of_shipped_robots_are_derived(robot: str) -> None:
     generic = architecture(setting_of(robot))
     basis = generic.basis
-    assert basis.observed == ()
-    assert basis.carried + basis.kept == len(ties(generic.relations)) > 0
-    assert basis.held < 1e-10
-    assert basis.missed is None
+    assert basis.sampled == ()
+    assert basis.structural + basis.loop_invariant == len(ties(generic.relations)) > 0
+    assert basis.largest_defect_held < 1e-10
+    assert basis.smallest_defect_not_held is None
 
 
 @pytest.mark.some(5)
@@ -75,7 +75,7 @@ def test_relations_of_random_robots_are_derived(mechanism: Mechanism, seed: int)
         states = walked(generic.mechanism, 3, seed)
     except (HrsynthError, NotAssembled, Undecided):
         assume(False)
-    assert generic.basis.observed == ()
+    assert generic.basis.sampled == ()
     for tie in ties(generic.relations):
         if tie.kind != "seen":
             assert miss(tie, generic.mechanism, generic.relations, states[-1]) < 1e-7, tie.words(generic.relations)
@@ -84,11 +84,11 @@ def test_relations_of_random_robots_are_derived(mechanism: Mechanism, seed: int)
 @pytest.mark.parametrize("robot", ["3rps", "3ruu", "6pus", "delta", "i4l", "quattro_rigid"])
 def test_what_holds_at_zero_by_accident_is_not_kept(robot: str) -> None:
     """These are more special at zero than elsewhere: motion breaks some of it, and a word of proof is not said."""
-    setting = setting_of(robot)
-    everything = setting.everything
-    start, question = everything.start, everything.question
-    here = architecture_of(setting.mechanism, question, [start], relation(start, question))
-    persistent = architecture(setting)
+    setup = setting_of(robot)
+    all_samples = setup.all_samples
+    start, observation_model = all_samples.start, all_samples.observation_model
+    here = architecture_of(setup.mechanism, observation_model, [start], relation(start, observation_model))
+    persistent = architecture(setup)
     assert len(ties(here.relations)) > len(ties(persistent.relations))
     every = ties(here.relations)
     answers = are_kept(
@@ -125,13 +125,13 @@ def test_what_is_carried_is_kept(seed: int) -> None:
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_the_degree_of_identities_is_bounded(robot: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Numbers of k more bits make motions of at most degree · k more: the bound is none that is too low."""
-    setting = setting_of(robot)
-    relations = architecture(setting).relations
+    setup = setting_of(robot)
+    relations = architecture(setup).relations
     bits = []
     for power in (20, 100):
         monkeypatch.setattr(instances, "LARGEST_RANDOM", 2**power)
         found = instance(
-            setting.mechanism, relations, architecture(setting).observations, draw(relations, random.Random(0))
+            setup.mechanism, relations, architecture(setup).observations, draw(relations, random.Random(0))
         )
         bits.append(max(int(x).bit_length() for twist in found.twists().values() for x in twist.ravel()))
     assert 0 < bits[1] - bits[0] <= 80 * degree(relations, len(found.free))
@@ -194,7 +194,7 @@ def test_robots_without_axes_or_without_centres() -> None:
 @pytest.mark.parametrize("robot", ["3upu", "delta", "quattro", "3rps", "hexaglide"])
 def test_the_seed_of_the_samples_does_not_matter(robot: str) -> None:
     settings = [ObservedRobot.of(load(robot), samples=4, seed=seed) for seed in (0, 1, 2)]
-    architectures = [architecture(setting) for setting in settings]
+    architectures = [architecture(setup) for setup in settings]
     assert len({frozenset(ties(each.relations)) for each in architectures}) == 1
     verdicts = [each.verdict(each.observations) for each in architectures]
     assert len({(verdict.rank, verdict.proved, verdict.reason) for verdict in verdicts}) == 1
@@ -223,7 +223,7 @@ def pod(request: pytest.FixtureRequest) -> ObservedRobot:
 def test_a_mixture_of_operation_modes_proves_nothing(pod: ObservedRobot) -> None:
     generic = architecture(pod)
     verdict = generic.verdict(pod.segments[1:3])
-    ranks = {select_relation(m.relation, (1, 2)).rank for m in pod.everything.members}
+    ranks = {select_relation(m.relation, (1, 2)).rank for m in pod.all_samples.members}
     assert verdict.verdict in ((PARTIAL,) if ranks == {2} else (PARTIAL, None))
     if verdict.verdict is None:
         assert "operation modes" in verdict.reason
@@ -261,9 +261,9 @@ def nearly(misses: dict[str, float], seed: int) -> Mechanism:
 @pytest.mark.parametrize("angle", [1e-12, 1e-9, 1e-8, 1e-6, 1e-4])
 def test_rails_that_are_nearly_parallel(angle: float) -> None:
     """The verdict is that of the numbers, and says how near the other one is."""
-    setting = ObservedRobot.of(nearly({"guide_2": angle}, seed=int(-np.log10(angle))), samples=4)
-    verdict = architecture(setting).verdict(setting.observed)
-    assert {member.relation.rank for member in setting.everything.members} == {verdict.rank}
+    setup = ObservedRobot.of(nearly({"guide_2": angle}, seed=int(-np.log10(angle))), samples=4)
+    verdict = architecture(setup).verdict(setup.observed)
+    assert {member.relation.rank for member in setup.all_samples.members} == {verdict.rank}
     assert verdict.verdict == (PARTIAL if angle < 1e-7 else CONTROLLABLE)
     told = "count as held" if angle < 1e-7 else "does not count"
     assert (told in verdict.reason) == (angle > 1e-10)
@@ -282,7 +282,7 @@ def test_no_verdict_where_held_and_missed_are_close() -> None:
             for rail, angle in zip(rails, angles, strict=True)
         ]
     )
-    setting = ObservedRobot.of(bent, samples=4)
-    verdict = architecture(setting).verdict(setting.observed)
+    setup = ObservedRobot.of(bent, samples=4)
+    verdict = architecture(setup).verdict(setup.observed)
     assert not verdict.exact
     assert "nearly special" in verdict.reason

@@ -66,15 +66,15 @@ def test_all_sets_obey(robot: str) -> None:
     for chosen, verdict in sets.items():
         assert verdict.dof == answer.dof
         assert verdict.gap > RANK_GAP
-        assert verdict.rank + len(verdict.lost) == answer.dof
+        assert verdict.rank + len(verdict.unobserved) == answer.dof
         assert verdict.verdict == (CONTROLLABLE if verdict.rank == answer.dof else PARTIAL if verdict.rank else BLIND)
         for fewer in combinations(chosen, len(chosen) - 1):
             if fewer:
                 assert sets[fewer].rank <= verdict.rank
-        if verdict.lost:
-            twists = np.column_stack([freedom.twist for freedom in verdict.lost])
-            assert np.linalg.matrix_rank(twists) == len(verdict.lost)
-            assert len({freedom.name for freedom in verdict.lost}) == len(verdict.lost)
+        if verdict.unobserved:
+            twists = np.column_stack([freedom.twist for freedom in verdict.unobserved])
+            assert np.linalg.matrix_rank(twists) == len(verdict.unobserved)
+            assert len({freedom.name for freedom in verdict.unobserved}) == len(verdict.unobserved)
     best = max(each.rank for each in answer.sets)
     size = min(len(each) for each, verdict in sets.items() if verdict.rank == best)
     assert set(answer.minimal) == {
@@ -82,12 +82,12 @@ def test_all_sets_obey(robot: str) -> None:
     }
 
 
-def lost_by_oracle(setting: ObservedRobot, chosen: tuple[str, ...]) -> Array:
+def lost_by_oracle(setup: ObservedRobot, chosen: tuple[str, ...]) -> Array:
     """The platform twists (metres) that these legs do not see at the zero configuration, by the oracle."""
-    everything = setting.everything
-    observations = [o for o in everything.question.observations if o.leg in chosen]
-    oracle = Oracle(everything.twin.mechanism)
-    basis = oracle.relation(state_of(everything.twin, everything.twin.q0), observations, unit_length=1.0)
+    all_samples = setup.all_samples
+    observations = [o for o in all_samples.observation_model.observations if o.leg in chosen]
+    oracle = Oracle(all_samples.model.mechanism)
+    basis = oracle.relation(state_of(all_samples.model, all_samples.model.q0), observations, unit_length=1.0)
     _, values, right = np.linalg.svd(basis[6:])
     kernel = right[int(np.sum(values > 1e-8)) :].T
     U, values, _ = np.linalg.svd(basis[:6] @ kernel, full_matrices=False)
@@ -112,8 +112,8 @@ def test_lost_freedoms_are_those_of_the_oracle(robot: str, size: int) -> None:
         if len(chosen) != size:
             continue
         lost = lost_by_oracle(setting_of(robot), chosen)
-        assert lost.shape[1] == len(verdict.lost)
-        for freedom in verdict.lost:
+        assert lost.shape[1] == len(verdict.unobserved)
+        for freedom in verdict.unobserved:
             twist = freedom.twist / np.linalg.norm(freedom.twist)
             assert np.linalg.norm(twist - lost @ (lost.T @ twist)) < 1e-6, freedom.name
 
@@ -135,14 +135,14 @@ DRAWN = np.random.default_rng(7).normal(size=(6, 3))
 )
 def test_lost_freedoms_are_named_by_their_space_alone(robot: str, lost: np.ndarray) -> None:
     """Whatever basis rounding gives of it: their twists span it, and are the same for any other basis."""
-    anatomy, length = setting_of(robot).anatomy, setting_of(robot).mechanism.length
+    decomposition, length = setting_of(robot).decomposition, setting_of(robot).mechanism.length
     twists = np.linalg.qr(lost / np.repeat([[length], [1.0]], 3, axis=0))[0]
-    named = name_freedoms(twists, anatomy)
+    named = name_freedoms(twists, decomposition)
     assert len(named) == lost.shape[1]
     assert np.linalg.matrix_rank(np.column_stack([lost, *(each.twist for each in named)]), tol=1e-8) == len(named)
     for seed in range(5):
         turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(len(named), len(named))))[0]
-        again = name_freedoms(twists @ turn, anatomy)
+        again = name_freedoms(twists @ turn, decomposition)
         assert [each.name for each in again] == [each.name for each in named]
         assert all(np.allclose(a.twist, b.twist, atol=1e-9) for a, b in zip(again, named, strict=True))
 
@@ -157,7 +157,7 @@ def test_sets_that_see_less_at_zero_are_told(robot: str, singular: str) -> None:
     answer = legs(robot, at=at.pose("platform"))
     assert all(each.rank_at_zero is None for each in found(robot).sets)
     for each in answer.sets:
-        shown = each.dof - lost_by_oracle(answer.setting, each.legs).shape[1]
+        shown = each.dof - lost_by_oracle(answer.setup, each.legs).shape[1]
         assert each.rank_at_zero == (shown if shown < each.rank else None), each.legs
         assert each.to_dict().get("rank_at_zero", each.rank) == shown
     chosen = table_of(answer)[tuple(singular.split(","))]
@@ -177,8 +177,8 @@ def test_quattro() -> None:
     assert set(answer.minimal) == {("1", "3"), ("1", "4"), ("2", "3"), ("2", "4")}
     for pair in (("1", "2"), ("3", "4")):
         assert sets[pair].rank == 3
-        assert sets[pair].lost[0].name.startswith("rotation about")
-        axis = sets[pair].lost[0].twist[3:]
+        assert sets[pair].unobserved[0].name.startswith("rotation about")
+        axis = sets[pair].unobserved[0].twist[3:]
         assert abs(axis[2]) == pytest.approx(np.linalg.norm(axis))
     assert all(sets[each].verdict == CONTROLLABLE for each in combinations("1234", 3))
     assert all(sets[(each,)].rank == 2 for each in "1234")
@@ -190,7 +190,7 @@ def test_quattro_rigid() -> None:
     assert answer.dof == 3
     assert set(answer.minimal) == set(combinations("1234", 2))
     for label in "1234":
-        (lost,) = sets[(label,)].lost
+        (lost,) = sets[(label,)].unobserved
         assert lost.name.startswith("translation along")
         np.testing.assert_allclose(lost.twist[3:], 0, atol=1e-9)
 
@@ -200,25 +200,25 @@ def test_two_legs_of_a_delta_suffice(robot: str) -> None:
     answer, sets = found(robot), table(robot)
     assert set(answer.minimal) == set(combinations("123", 2))
     for label in "123":
-        (lost,) = sets[(label,)].lost
+        (lost,) = sets[(label,)].unobserved
         assert sets[(label,)].rank == 2
         assert lost.name.startswith("translation along")
 
 
 def test_a_leg_of_the_orthoglide_does_not_see_its_own_rail() -> None:
     sets = table("orthoglide")
-    assert [sets[(each,)].lost[0].name for each in "123"] == [f"translation along {axis}" for axis in "xyz"]
+    assert [sets[(each,)].unobserved[0].name for each in "123"] == [f"translation along {axis}" for axis in "xyz"]
 
 
 def test_a_leg_of_the_delta_does_not_see_its_circle() -> None:
     """With its rod's direction fixed a leg lets the platform follow the elbow: normal to the arm and to the R axis."""
-    setting, sets = setting_of("delta"), table("delta")
+    setup, sets = setting_of("delta"), table("delta")
     for label in "123":
         shoulder = next(
-            j for n in setting.anatomy.leg(label).joints if (j := setting.mechanism.joints[n]).predecessor == "base"
+            j for n in setup.decomposition.leg(label).joints if (j := setup.mechanism.joints[n]).predecessor == "base"
         )
-        elbow = np.mean([j.point for j in setting.mechanism.joints_of(shoulder.successor) if j is not shoulder], axis=0)
-        twist = sets[(label,)].lost[0].twist[:3]
+        elbow = np.mean([j.point for j in setup.mechanism.joints_of(shoulder.successor) if j is not shoulder], axis=0)
+        twist = sets[(label,)].unobserved[0].twist[:3]
         tangent = np.cross(shoulder.axis, elbow - shoulder.point)
         assert np.linalg.norm(np.cross(twist, tangent)) < 1e-9 * np.linalg.norm(twist) + 1e-9
 
@@ -233,7 +233,7 @@ def test_gough_stewart() -> None:
     for a, b in pairs:
         assert sets[a, b].verdict == PARTIAL
         assert sets[a, b].rank == 4
-        assert f"rotation about the line B{a} B{b}" in [freedom.name for freedom in sets[a, b].lost]
+        assert f"rotation about the line B{a} B{b}" in [freedom.name for freedom in sets[a, b].unobserved]
     assert all(sets[(each,)].rank == 2 for each in "123456")
 
 
@@ -246,12 +246,12 @@ def test_blind_legs() -> None:
 def test_the_whole_hexaglide_misses_its_rails() -> None:
     whole = table("hexaglide")[tuple("123456")]
     assert whole.verdict == PARTIAL
-    assert [freedom.name for freedom in whole.lost] == ["translation along x"]
+    assert [freedom.name for freedom in whole.unobserved] == ["translation along x"]
 
 
 def test_progress_and_record() -> None:
     told: list[str] = []
-    with hrsynth.following(told.append):
+    with hrsynth.on_progress(told.append):
         answer = legs(load("3rrr_m1"))
     assert told.count("sets of legs") == len(answer.sets) == 7
     record = answer.to_dict()
@@ -287,12 +287,12 @@ def watching_both(robot: str = "rrrrr_m1") -> Mechanism:
 def test_all_that_the_file_watches_of_a_leg_counts_in_its_sets() -> None:
     """The directions of both links of one leg are the place of their end: u1 and u2, whatever the other leg does."""
     robot = watching_both()
-    setting = ObservedRobot.of(robot)
-    twin, oracle = setting.everything.twin, Oracle(setting.everything.twin.mechanism)
-    state = state_of(twin, setting.configurations[0].q)
+    setup = ObservedRobot.of(robot)
+    model, oracle = setup.all_samples.model, Oracle(setup.all_samples.model.mechanism)
+    state = state_of(model, setup.configurations[0].q)
     for chosen in (("1",), ("2",), ("1", "2")):
         seen = [o for o in robot.observations if o.leg in chosen]
-        basis = oracle.relation(state, seen, point_only=setting.everything.question.point is not None)
+        basis = oracle.relation(state, seen, point_only=setup.all_samples.observation_model.point is not None)
         twists, rates = basis[: -3 * len(seen)], basis[-3 * len(seen) :]
         _, values, right = np.linalg.svd(rates)
         unseen = np.linalg.matrix_rank(twists @ right[int(np.sum(values > 1e-8)) :].T, tol=1e-8)
@@ -354,7 +354,7 @@ def held_plate() -> Mechanism:
 def test_a_platform_without_freedom_is_not_called_controllable() -> None:
     """Nothing is proved of it either: that it rests at one instance does not say that it rests at others."""
     answer = legs(held_plate())
-    assert (answer.dof, answer.setting.mobility.total) == (0, 1)
+    assert (answer.dof, answer.setup.mobility.total) == (0, 1)
     assert {(each.verdict, each.rank) for each in answer.sets} == {(AT_REST, 0)}
     assert {(each.verdict, each.proved, each.chance) for each in answer.exact} <= {
         (AT_REST, False, 0.0),

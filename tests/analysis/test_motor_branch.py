@@ -171,7 +171,7 @@ def test_a_crank_stays_on_its_branch_over_a_whole_turn():
     """Bars 1, 0.5, 1.2, 0.8: one branch all round, which comes back to itself; no tube holds the other closure."""
     robot = four_bar()
     (part,) = branch(robot).parts
-    assert part.share == part.box_share == 1.0
+    assert part.volume_fraction == part.box_fraction == 1.0
     assert part.turns == (("a", True),)
     assert connected(part)
     d, b = part.passive.index("d"), part.passive.index("b")
@@ -248,7 +248,7 @@ def test_tubes_hold_what_small_steps_find(name, half):
     robot = load(name)
     box = {joint.name: (-half, half) for joint in robot.joints.values() if joint.actuated}
     proof = branch(robot, box, effort=100)
-    assert proof.parts[0].share == 1.0
+    assert proof.parts[0].volume_fraction == 1.0
     assert obeys(proof, np.random.default_rng(1), 3, 6) == 18
 
 
@@ -334,7 +334,7 @@ def test_a_motor_may_be_called_anything_but_a_comma():
         base=robot.base,
     )
     found = branch(named, "crank=a:b=-0.01:0.02")
-    assert np.array(found.parts[0].asked).ravel() == pytest.approx([-0.01, 0.02])
+    assert np.array(found.parts[0].requested_box).ravel() == pytest.approx([-0.01, 0.02])
 
 
 def test_limits_that_limit_nothing_are_a_whole_turn():
@@ -345,7 +345,7 @@ def test_limits_that_limit_nothing_are_a_whole_turn():
     )
     found = branch(wide, effort=2)
     assert found.box == "a whole turn"
-    assert np.array(found.parts[0].asked).ravel() == pytest.approx([-np.pi, np.pi])
+    assert np.array(found.parts[0].requested_box).ravel() == pytest.approx([-np.pi, np.pi])
 
 
 @pytest.mark.slow
@@ -379,8 +379,8 @@ def test_a_truss_on_the_way_stays_as_it_is():
     b.joint("t3", "R", "one", "two", (1.5, 0.1, 0), axis=Z, loop=True)
     proof = branch(b.build(platform="one"), "a=-0.1:0.1")
     assert [part.motors for part in proof.parts] == [("a",)]
-    assert {"t1", "t2"} <= set(proof.held)
-    assert proof.parts[0].share == 1.0
+    assert {"t1", "t2"} <= set(proof.fixed)
+    assert proof.parts[0].volume_fraction == 1.0
     assert obeys(proof, np.random.default_rng(0), 2, 5) == 10
 
 
@@ -396,7 +396,7 @@ def test_a_gear_comes_back_after_whole_turns_alone(ratio):
     b.coupling("g", "one", "two", ratio)
     for platform in ("one", "two"):
         (part,) = branch(b.build(platform=platform)).parts
-        assert part.share == 1.0
+        assert part.volume_fraction == 1.0
         assert part.turns == (("m", ratio == round(ratio)),)
 
 
@@ -444,7 +444,7 @@ def test_a_thin_box_has_the_bound_of_the_loops_at_its_middle():
     robot = spherical(np.random.default_rng(0))
     least = [
         min(
-            cell.weakest
+            cell.smallest_singular_value
             for part in branch(robot, box={f"joint_{k}_1": (-w, w) for k, w in enumerate((0.01, *widths), 1)}).parts
             for cell in part.cells
         )

@@ -16,7 +16,7 @@ from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.derive import derive
 from hrsynth.analysis.modes.modes import modes
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.analysis.singularity.singular import singular
+from hrsynth.analysis.singularity.singularities import singularities
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, NoSegment
 from strategies import spherical
@@ -26,16 +26,16 @@ QUESTIONS: dict[str, Callable[..., Any]] = {
     "check": check,
     "advise": advise,
     "modes": modes,
-    "singular": lambda *asked, **more: singular(*asked, points=20, **more),
+    "singularities": lambda *asked, **more: singularities(*asked, points=20, **more),
 }
 
 
 @pytest.mark.some(2)
 @pytest.mark.parametrize("name", QUESTIONS)
 def test_an_observed_robot_is_asked_as_its_parts_are(name: str) -> None:
-    question, robot = QUESTIONS[name], load("3rrr_m1")
+    observation_model, robot = QUESTIONS[name], load("3rrr_m1")
     observed = hrsynth.observe(robot, "1,2", "platform", seed=3)
-    assert question(observed).to_dict() == question(robot, "1,2", "platform", seed=3).to_dict()
+    assert observation_model(observed).to_dict() == observation_model(robot, "1,2", "platform", seed=3).to_dict()
 
 
 def test_a_pose_takes_the_place_of_the_zero_configuration() -> None:
@@ -48,9 +48,9 @@ def test_a_pose_takes_the_place_of_the_zero_configuration() -> None:
 def test_one_observed_robot_is_sampled_once() -> None:
     told: list[str] = []
     observed = hrsynth.observe(load("delta"))
-    with hrsynth.following(told.append):
+    with hrsynth.on_progress(told.append):
         derive(observed)
-        modes(observed, at=observed.everything.start)
+        modes(observed, at=observed.all_samples.start)
     assert "sampling" not in told
     assert {"certificate", "modes"} <= set(told)
 
@@ -73,4 +73,4 @@ def test_a_question_about_motors_needs_no_segments() -> None:
     assert len(found.modes) == len(other.modes) > 1
     for one, two in zip(found.modes, other.modes, strict=True):
         assert one.pose.rpy == pytest.approx(two.pose.rpy, abs=1e-9)
-    assert singular(robot, real=True, points=20).verdict.rank == 3
+    assert singularities(robot, real=True, points=20).verdict.rank == 3

@@ -13,8 +13,8 @@ from hrsynth.analysis.derive import Derivation, derive
 from hrsynth.analysis.exact import architecture
 from hrsynth.analysis.observed import ObservedRobot, restrict_samples
 from hrsynth.analysis.verdict import verdict_of
-from hrsynth.description import load, native, shipped
-from hrsynth.errors import BadRequest, NotMeasured, RankUndecided
+from hrsynth.description import list_robots, load, native
+from hrsynth.errors import BadRequest, RankUndecided, UndefinedValue
 from hrsynth.geometry.vectors import Array, pose, transform
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Mechanism
@@ -89,10 +89,10 @@ def watched(mechanism: Mechanism, kind: str) -> ObservedRobot:
 
 def certified(mechanism: Mechanism, kind: str, form: str = "simplified") -> Derivation:
     """The law: the lift, and what is left of it, have the relation of the robot; so does what is written of it."""
-    setting = watched(mechanism, kind)
-    found = derive(setting, form=form)
-    assert found.certificate.passed
-    assert found.certificate.largest_angle < SAME_RELATION
+    setup = watched(mechanism, kind)
+    found = derive(setup, form=form)
+    assert found.equivalence.passed
+    assert found.equivalence.largest_angle < SAME_RELATION
     lifts = [step for step in found.steps if step.rule == "lift"]
     assert lifts
     assert all(step.accepted for step in lifts)
@@ -106,7 +106,7 @@ def certified(mechanism: Mechanism, kind: str, form: str = "simplified") -> Deri
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("robot", ["free_body", "arm", "gough_stewart"])
 def test_every_kind_is_certified(robot: str, kind: str) -> None:
-    mechanism = load(robot) if robot in shipped() else {"free_body": free_body, "arm": arm}[robot]()
+    mechanism = load(robot) if robot in list_robots() else {"free_body": free_body, "arm": arm}[robot]()
     if robot == "free_body" and kind == "encoder":
         with pytest.raises(BadRequest, match="one with one axis or two"):
             ObservedRobot.of(mechanism, see="encoder:free")
@@ -121,19 +121,19 @@ def test_exact_ranks_are_those_of_samples(robot: str, kind: str) -> None:
     """For a generic camera, point and axis, of one observation and of two; one edge alone is irrational."""
     if (robot, kind) == ("free_body", "encoder"):
         return
-    setting = watched(
+    setup = watched(
         {"free_body": free_body, "arm": arm}[robot]() if robot in ("free_body", "arm") else load(robot), kind
     )
-    exact = architecture(setting)
-    for observed in (setting.observed, setting.observed[:1]):
+    exact = architecture(setup)
+    for observed in (setup.observed, setup.observed[:1]):
         found = exact.verdict(observed)
         if kind == "edge":
             assert (found.exact, found.reason) == (False, "what is measured by edge edge_1 is not rational")
             continue
         assert found.exact, found.reason
         try:
-            samples = restrict_samples(setting.everything, observed)
-            assert found.rank == verdict_of(setting, [o.leg for o in observed], samples).rank
+            samples = restrict_samples(setup.all_samples, observed)
+            assert found.rank == verdict_of(setup, [o.leg for o in observed], samples).rank
         except RankUndecided:  # a circle far away hardly shows how it is turned
             assert (kind, found.rank) == ("image_circle", min(5 * len(observed), found.dof))
         assert found.proved is (found.rank == found.dof)
@@ -152,7 +152,7 @@ def test_all_kinds_together_are_certified_on_every_robot(robot: str) -> None:
     see = [word for kind in KINDS for word in asked(mechanism, kind, np.random.default_rng(KINDS.index(kind)))]
     cameras = [f"{c.name}={c.link}@" + ",".join(map(str, c.pose[:3, 3])) for c in every[0].robot.cameras]
     found = derive(mechanism, camera=cameras, see=see)
-    assert found.certificate.passed
+    assert found.equivalence.passed
     assert sum(step.rule == "lift" and step.accepted for step in found.steps) == len(see)
 
 
@@ -161,15 +161,15 @@ def test_all_kinds_together_are_certified_on_every_robot(robot: str) -> None:
 @pytest.mark.parametrize("robot", [*ROBOTS, "spatial"])
 def test_every_kind_is_certified_on_every_robot(robot: str, kind: str) -> None:
     for form in ("simplified", "general"):
-        assert certified(robot_of(robot), kind, form).certificate.passed
+        assert certified(robot_of(robot), kind, form).equivalence.passed
 
 
 @pytest.mark.parametrize(("robot", "least"), [("rprpr_m1", 1), ("rrrrr_m2", 0)])
 def test_samples_with_the_camera_inside_of_a_cylinder_are_discarded(robot: str, least: int) -> None:
-    setting = watched(load(robot), "edge")
-    assert setting.everything.discarded >= least
-    assert all(np.isfinite(member.relation.basis).all() for member in setting.everything.members)
-    assert certified(load(robot), "edge").certificate.passed
+    setup = watched(load(robot), "edge")
+    assert setup.all_samples.discarded >= least
+    assert all(np.isfinite(member.relation.basis).all() for member in setup.all_samples.members)
+    assert certified(load(robot), "edge").equivalence.passed
 
 
 # ---- image points
@@ -198,12 +198,12 @@ def test_three_points_of_a_free_body_are_three_ups() -> None:
 @pytest.mark.parametrize("count", [3, 4])
 def test_points_seen_from_the_hand_of_an_arm(count: int) -> None:
     """The arm itself goes: what is left is the camera between the points."""
-    setting = eye_in_hand(arm(), count)
-    found = derive(setting)
+    setup = eye_in_hand(arm(), count)
+    found = derive(setup)
     assert found.hidden_architecture is not None
     assert found.hidden_architecture.unicode == f"{count}-SPU̲"
     assert found.verdict == "controllable"
-    ranks = {len(each.legs): each.rank for each in legs(setting).sets}
+    ranks = {len(each.legs): each.rank for each in legs(setup).sets}
     assert ranks == {size: min(2 * size, 6) for size in range(1, count + 1)}
 
 
@@ -211,10 +211,10 @@ def test_points_seen_from_the_hand_of_an_arm(count: int) -> None:
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_verdicts_agree_with_pixels_of_the_arm(count: int) -> None:
     """The rank of pixels' derivatives by the joints' angles, by the product of exponentials and differences alone."""
-    setting = eye_in_hand(arm(), count)
-    robot = setting.robot
+    setup = eye_in_hand(arm(), count)
+    robot = setup.robot
     hand = robot.links["platform"].pose
-    points = [robot.links["base"].pose @ np.append(o.to_dict()["at"], 1.0) for o in setting.observed]
+    points = [robot.links["base"].pose @ np.append(o.to_dict()["at"], 1.0) for o in setup.observed]
 
     def pixels(angles: Array) -> Array:
         D = np.eye(4)
@@ -226,7 +226,7 @@ def test_verdicts_agree_with_pixels_of_the_arm(count: int) -> None:
 
     angles, h = np.random.default_rng(4).uniform(-0.1, 0.1, 6), 1e-6
     J = np.column_stack([(pixels(angles + h * e) - pixels(angles - h * e)) / (2 * h) for e in np.eye(6)])
-    assert np.linalg.matrix_rank(J, tol=1e-5) == derive(setting).verdict.rank
+    assert np.linalg.matrix_rank(J, tol=1e-5) == derive(setup).verdict.rank
 
 
 def test_a_leg_that_carries_what_is_observed_or_sees_is_never_removed() -> None:
@@ -243,7 +243,7 @@ def test_motions_that_move_an_observed_value_are_not_idle() -> None:
     """A rod that spins between two balls, seen by a camera."""
     plain, watched_ = (ObservedRobot.of("delta", see=see) for see in (None, ["point:rod_1a@0.05,0.02,-0.1"]))
     assert plain.mobility.total == watched_.mobility.total
-    assert plain.mobility.idle == watched_.mobility.idle + 1
+    assert plain.mobility.internal == watched_.mobility.internal + 1
 
 
 @pytest.mark.parametrize("kind", ["point", "distance", "image_line"])
@@ -257,7 +257,7 @@ def test_what_always_goes_through_the_camera_s_centre_is_refused(kind: str, seed
         ",".join(map(str, transform(np.linalg.inv(mechanism.links[link].pose), joint.point))) for link in joint.links
     )
     see = f"eye={kind}:{joint.links[1]}@{there}" + ("/0.3,0.4,0.5" if kind == "image_line" else "")
-    with pytest.raises(NotMeasured, match="camera's centre"):
+    with pytest.raises(UndefinedValue, match="camera's centre"):
         ObservedRobot.of(mechanism, camera=[f"eye={joint.links[0]}@{here}"], see=[see])
 
 

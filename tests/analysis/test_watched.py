@@ -28,9 +28,9 @@ WHY = {
 @pytest.mark.parametrize("name", WHY)
 def test_the_watched_axis_is_told_with_its_reason(name: str):
     found = check(name)
-    for (seen, why), record in zip(found.setting.watched(), found.to_dict()["watched"], strict=True):
+    for (seen, why), record in zip(found.setup.observed_axes(), found.to_dict()["observations"], strict=True):
         assert why.startswith(WHY[name])
-        assert (record["leg"], record["link"], record["why"]) == (seen.leg, seen.link, why)
+        assert (record["leg"], record["link"], record["reason"]) == (seen.leg, seen.link, why)
         assert isinstance(seen, Direction)
         assert np.allclose(record["axis"], seen.direction)
         assert f"{seen.link} along (" in str(found)
@@ -39,7 +39,7 @@ def test_the_watched_axis_is_told_with_its_reason(name: str):
 
 def test_sets_of_links_that_are_asked_for():
     found = legs("delta", observe="arm_1,rod_2a")
-    assert [why for _, why in found.setting.watched()] == ["asked for", WHY["quattro"]]
+    assert [why for _, why in found.setup.observed_axes()] == ["asked for", WHY["quattro"]]
     assert [each.legs for each in found.sets] == [("1",), ("2",), ("1", "2")]
     single = [check("delta", observe=link).postures[0].hidden.rank for link in ("arm_1", "rod_2a")]
     assert [each.rank for each in found.sets[:2]] == single
@@ -75,11 +75,11 @@ def test_mobility_is_that_of_the_normal_form_and_that_of_the_file(tmp_path):
     )
     (tmp_path / "arm.urdf").write_text(text)
     found = check(load(tmp_path / "arm.urdf", platform="c"))
-    oracle = Oracle(found.setting.robot)
+    oracle = Oracle(found.setup.robot)
     written = oracle.mobility(oracle.zero())
-    assert (found.setting.mobility.total, found.as_written.total) == (2, written) == (2, 3)
+    assert (found.setup.mobility.total, found.as_written.total) == (2, written) == (2, 3)
     assert found.to_dict()["mobility"]["as_written"]["total"] == 3
-    assert derive(found.setting).to_dict()["mobility"] == found.to_dict()["mobility"]
+    assert derive(found.setup).to_dict()["mobility"] == found.to_dict()["mobility"]
     assert "3 as the file is written, 2 in normal form" in str(found)
 
 

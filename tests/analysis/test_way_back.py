@@ -64,8 +64,8 @@ def test_a_rocker_leads_back_between_its_dead_points_alone(seed):
     dead = dead_points(bars, angle, side)
     assert len(dead) == 2
     assert not proof.regular
-    assert proof.back is not None
-    (low,), (high,) = proof.back
+    assert proof.injective_box is not None
+    (low,), (high,) = proof.injective_box
     assert low < 0 < high
     assert not np.any((dead > low + 1e-3) & (dead < high - 1e-3))
     assert min(abs(dead - low)) < 0.2 or low < -3
@@ -78,8 +78,8 @@ def test_on_another_branch_other_motors_in_the_box_give_the_same_pose():
     bars, angle = (0.3, 1.0, 0.9, 1.1), 0.3
     proof = branch(rocker_driven(bars, angle, 1), {"a": (-1.0, 1.0)})
     assert proof.regular
-    assert proof.back is not None
-    (low,), (high,) = proof.back
+    assert proof.injective_box is not None
+    (low,), (high,) = proof.injective_box
     ground, crank, coupler, rocker = bars
     q = np.linspace(low, high, 101)
     turned = rocker_angle(bars, angle, 1, q)
@@ -102,8 +102,8 @@ def test_without_a_dead_point_the_whole_box_leads_back():
     low, high = (0.9 * dead_points(bars, angle, side)).tolist()
     proof = branch(rocker_driven(bars, angle, side), {"a": (low, high)})
     assert proof.regular
-    assert proof.back is not None
-    np.testing.assert_array_equal(np.ravel(proof.back), [low, high])
+    assert proof.injective_box is not None
+    np.testing.assert_array_equal(np.ravel(proof.injective_box), [low, high])
 
 
 @pytest.mark.slow
@@ -113,11 +113,11 @@ def test_a_crank_that_is_the_platform_leads_back_everywhere():
     own = Mechanism.of("crank", robot.links.values(), robot.joints.values(), base="base", platform="crank")
     whole = branch(own)
     assert whole.regular
-    assert whole.back is not None
-    assert whole.back[1][0] - whole.back[0][0] < 2 * np.pi
+    assert whole.injective_box is not None
+    assert whole.injective_box[1][0] - whole.injective_box[0][0] < 2 * np.pi
     part = branch(own, "a=-3.1:3.1")
-    assert part.back is not None
-    np.testing.assert_array_equal(np.ravel(part.back), [-3.1, 3.1])
+    assert part.injective_box is not None
+    np.testing.assert_array_equal(np.ravel(part.injective_box), [-3.1, 3.1])
 
 
 def chained(bars, angle, other_bars, other_angle, turn) -> Mechanism:
@@ -146,11 +146,11 @@ def test_loops_one_after_the_other():
     (bars, angle, _), (others, start, _) = crank_rockers(rng, [1]), crank_rockers(rng, [1])
     proof = branch(chained(bars, angle, others, start, random_rotation(rng)))
     assert len(proof.parts) == 2
-    assert proof.back is not None
+    assert proof.injective_box is not None
     for k, (each, begin) in enumerate(((bars, angle), (others, start))):
         dead = dead_points(each, begin, 1)
-        assert not np.any((dead > proof.back[0][k] + 1e-3) & (dead < proof.back[1][k] - 1e-3))
-        assert proof.back[0][k] < -0.1 * min(abs(dead))
+        assert not np.any((dead > proof.injective_box[0][k] + 1e-3) & (dead < proof.injective_box[1][k] - 1e-3))
+        assert proof.injective_box[0][k] < -0.1 * min(abs(dead))
 
 
 def test_a_motor_that_the_platform_does_not_feel_is_not_led_back_to():
@@ -162,8 +162,8 @@ def test_a_motor_that_the_platform_does_not_feel_is_not_led_back_to():
         Mechanism.of("first", robot.links.values(), robot.joints.values(), base="base", platform="rocker"),
         "a=-0.1:0.1,a2=-0.1:0.1",
     )
-    assert proof.parts[1].share == 1.0
-    assert proof.back is None
+    assert proof.parts[1].volume_fraction == 1.0
+    assert proof.injective_box is None
     assert not proof.regular
 
 
@@ -180,10 +180,10 @@ def test_motors_of_shipped_robots_are_functions_of_the_pose(name, half):
     robot = load(name)
     proof = branch(robot, {joint.name: (-half, half) for joint in robot.joints.values() if joint.actuated})
     assert proof.regular
-    assert proof.back is not None
-    np.testing.assert_array_equal(proof.back, proof.proved)
+    assert proof.injective_box is not None
+    np.testing.assert_array_equal(proof.injective_box, proof.proved)
     rng = np.random.default_rng(0)
-    q = [rng.uniform(*proof.back) for _ in range(6)]
+    q = [rng.uniform(*proof.injective_box) for _ in range(6)]
     poses = [pose_at(proof, each) for each in q]
     for k, (one, pose) in enumerate(zip(q, poses, strict=True)):
         for other, seen in zip(q[:k], poses, strict=False):

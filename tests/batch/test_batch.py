@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 
-from hrsynth.analysis.classes import interaction_matrix
 from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.analysis.singularity_indices import interaction_matrix
 from hrsynth.batch.engine import Batch, Evaluation
-from hrsynth.batch.holds import freedoms
 from hrsynth.batch.iterative_leg import IterativeLeg
+from hrsynth.batch.leg_wrenches import freedoms
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, HrsynthError, MissingExtra
 from hrsynth.geometry.vectors import Array
-from hrsynth.kinematics.relation import relation
+from hrsynth.kinematics.velocity_relation import relation
 from hrsynth.kinematics.walking import random_walk
 from hrsynth.mechanism.observations.direction import Direction
 from kinematics.robots import ROBOTS
@@ -36,9 +36,9 @@ SOLVED = {"3rps", "prrrp_m1", "prrrp_m2", "prrrp_parallel", "rprpr_m1", "rprpr_m
 
 @cache
 def shipped_batch(robot: str) -> tuple[ObservedRobot, Batch]:
-    setting = ObservedRobot.of(load(robot), samples=4)
-    assert setting.batch is not None
-    return setting, setting.batch
+    setup = ObservedRobot.of(load(robot), samples=4)
+    assert setup.batch is not None
+    return setup, setup.batch
 
 
 def poses_near(batch: Batch, count: int, size: float = 0.2, seed: int = 0) -> Array:
@@ -55,24 +55,26 @@ def poses_near(batch: Batch, count: int, size: float = 0.2, seed: int = 0) -> Ar
     return X
 
 
-def check_law(setting: ObservedRobot, legs: Sequence[str], count: int, seed: int = 3) -> int:
+def check_law(setup: ObservedRobot, legs: Sequence[str], count: int, seed: int = 3) -> int:
     """Directions, Mᵀ and singular values are Pinocchio's where the working mode is that of the zero configuration; at
     how many poses."""
-    batch = setting.batch
+    batch = setup.batch
     assert batch is not None
-    everything = setting.everything
+    all_samples = setup.all_samples
     watched = tuple(
-        o for o in everything.question.observations[: setting.defaults] if isinstance(o, Direction) and o.leg in legs
+        o
+        for o in all_samples.observation_model.observations[: setup.defaults]
+        if isinstance(o, Direction) and o.leg in legs
     )
-    question = replace(everything.question, observations=watched)
-    walk = list(random_walk(everything.start, count, seed=seed, steps=4))
-    found = batch.evaluate([at.pose(question.platform) for at in walk], [o.leg for o in watched])
+    observation_model = replace(all_samples.observation_model, observations=watched)
+    walk = list(random_walk(all_samples.start, count, seed=seed, steps=4))
+    found = batch.evaluate([at.pose(observation_model.platform) for at in walk], [o.leg for o in watched])
     compared = 0
     for i, at in enumerate(walk):
         u = np.array([at.pose(o.link)[:3, :3] @ o.direction for o in watched])
         if not found.reached[i] or np.max(np.abs(u - found.directions[i])) > 1e-3:
             continue
-        theirs = relation(at, question)
+        theirs = relation(at, observation_model)
         M = interaction_matrix(theirs)
         if M is None:
             continue
@@ -92,23 +94,23 @@ def check_law(setting: ObservedRobot, legs: Sequence[str], count: int, seed: int
 @pytest.mark.some(5)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_a_batch_is_the_relation_at_every_pose(robot: str) -> None:
-    setting, batch = shipped_batch(robot)
+    setup, batch = shipped_batch(robot)
     known = [name for name, leg in batch.legs.items() if leg is not None]
     assert batch.complete or robot == "i4l"
     assert batch.coordinates.constant == (robot not in SOLVED) == (not batch.holds)
     assert not batch.iterative
-    assert check_law(setting, known, POSES) >= POSES // 2
-    assert check_law(setting, known[-2:], 3) >= 1
+    assert check_law(setup, known, POSES) >= POSES // 2
+    assert check_law(setup, known[-2:], 3) >= 1
 
 
 @pytest.mark.parametrize("robot", sorted(SOLVED))
 def test_what_legs_forbid_in_closed_form_is_what_their_joints_forbid(robot: str) -> None:
     """The twists of the closed forms are those of the legs' own links, closed by Newton's method, at other poses."""
-    setting, batch = shipped_batch(robot)
-    mechanism, anatomy = setting.mechanism, setting.anatomy
-    seen = dict(zip(anatomy.labels, setting.segments, strict=True))
-    X = np.array([at.pose(mechanism.platform) for at in random_walk(setting.everything.start, 12, seed=5, steps=4)])
-    chains = [IterativeLeg.of(mechanism, leg, seen[leg.label], None) for leg in anatomy.legs]  # type: ignore[arg-type]
+    setup, batch = shipped_batch(robot)
+    mechanism, decomposition = setup.mechanism, setup.decomposition
+    seen = dict(zip(decomposition.labels, setup.segments, strict=True))
+    X = np.array([at.pose(mechanism.platform) for at in random_walk(setup.all_samples.start, 12, seed=5, steps=4)])
+    chains = [IterativeLeg.of(mechanism, leg, seen[leg.label], None) for leg in decomposition.legs]  # type: ignore[arg-type]
     rows = np.concatenate(
         [each.follow_from_zero(batch.coordinates, batch.home, X, batch.span).wrenches() for each in chains], axis=1
     )
@@ -156,14 +158,14 @@ def test_other_twists_at_each_pose_cost_no_more_than_three_times_a_constant_plat
 @given(parallel_robots())
 def test_a_batch_of_a_random_robot_is_its_relation(mechanism) -> None:
     try:
-        setting = ObservedRobot.of(mechanism, samples=3)
+        setup = ObservedRobot.of(mechanism, samples=3)
     except HrsynthError:
         return
-    batch = setting.batch
+    batch = setup.batch
     assert batch is not None
     known = [name for name, leg in batch.legs.items() if leg is not None]
     if known:
-        check_law(setting, known, 4)
+        check_law(setup, known, 4)
 
 
 @pytest.mark.some(1, 2)

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.batch.reach import generic_motion, reach, sweep
+from hrsynth.batch.pose_continuation import generic_motion, reach, sweep
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, NotSampled, PoseNotReached
 from hrsynth.geometry.so3 import logarithm, turn_about
@@ -35,8 +35,8 @@ quick = settings(
 )
 
 
-def motion_of(setting: ObservedRobot) -> PlatformMotion:
-    return PlatformMotion.of((m.configuration for m in setting.everything.members), setting.everything.question)
+def motion_of(setup: ObservedRobot) -> PlatformMotion:
+    return PlatformMotion.of((m.configuration for m in setup.all_samples.members), setup.all_samples.observation_model)
 
 
 def had(motion: PlatformMotion, X: Array) -> Pose:
@@ -45,16 +45,16 @@ def had(motion: PlatformMotion, X: Array) -> Pose:
     return replace(full, **{name: None for name in full.given if name not in motion.parts})
 
 
-def check_reached(setting: ObservedRobot, motion: PlatformMotion, X: Array) -> ClosedConfiguration:
-    everything = setting.everything
-    at = reach(everything.start, everything.question, had(motion, X), motion)
+def check_reached(setup: ObservedRobot, motion: PlatformMotion, X: Array) -> ClosedConfiguration:
+    all_samples = setup.all_samples
+    at = reach(all_samples.start, all_samples.observation_model, had(motion, X), motion)
     assert at.residual <= CLOSED
     found = at.pose(motion.link)
     assert np.linalg.norm(motion.position(found) - motion.position(X)) < 1e-9
     if motion.body:
         assert np.linalg.norm(found[:3, :3] - X[:3, :3]) < 1e-9
-    oracle = Oracle(everything.twin.mechanism)
-    assert oracle.error(state_of(at.twin, at.q)) < 1e-9
+    oracle = Oracle(all_samples.model.mechanism)
+    assert oracle.error(state_of(at.model, at.q)) < 1e-9
     return at
 
 
@@ -63,24 +63,24 @@ def check_reached(setting: ObservedRobot, motion: PlatformMotion, X: Array) -> C
 def test_poses_of_samples_are_reached_again(robot: str) -> None:
     """The pose is that of the sample; one step away from zero, where no other working mode is near, so are the
     directions."""
-    setting = setting_of(robot)
-    motion = motion_of(setting)
-    for member in setting.everything.members:
-        check_reached(setting, motion, member.way[-1].pose)
+    setup = setting_of(robot)
+    motion = motion_of(setup)
+    for member in setup.all_samples.members:
+        check_reached(setup, motion, member.way[-1].pose)
         first = member.way[0]
-        at = check_reached(setting, motion, first.pose)
+        at = check_reached(setup, motion, first.pose)
         if member.relation.RI:
             continue  # observed links move while the platform rests: the pose does not tell their directions
-        found = setting.everything.question.target(at)
+        found = setup.all_samples.observation_model.target(at)
         for (_, value), (_, wanted) in zip(found.measured, first.measured, strict=True):
             np.testing.assert_allclose(value, wanted, atol=1e-8)
 
 
-def check_printed(setting: ObservedRobot) -> None:
-    motion, everything = motion_of(setting), setting.everything
-    for member in setting.everything.members[:3]:
+def check_printed(setup: ObservedRobot) -> None:
+    motion, all_samples = motion_of(setup), setup.all_samples
+    for member in setup.all_samples.members[:3]:
         printed = Pose.parse(str(motion.pose(member.way[0].pose)))
-        at = reach(everything.start, everything.question, printed, motion)
+        at = reach(all_samples.start, all_samples.observation_model, printed, motion)
         apart = motion.position(at.pose(motion.link)) - motion.position(member.way[0].pose)
         assert np.linalg.norm(apart) < 1e-5 * max(1.0, float(np.abs(motion.position(motion.home)).max()))
         assert at.residual <= CLOSED
@@ -110,28 +110,28 @@ def test_a_pose_of_a_robot_that_stands_aslant_can_be_typed_as_it_is_printed(robo
     ],
 )
 def test_what_a_platform_can_change(robot: str, parts: tuple[str, ...]) -> None:
-    setting = setting_of(robot)
-    everything = setting.everything
-    assert motion_of(setting).parts == generic_motion(everything.start, everything.question).parts == parts
+    setup = setting_of(robot)
+    all_samples = setup.all_samples
+    assert motion_of(setup).parts == generic_motion(all_samples.start, all_samples.observation_model).parts == parts
     for name in {"x", "y", "z", "phi", "rpy"} - set(parts):
         pose = Pose(rpy=(0.1, 0, 0)) if name == "rpy" else Pose(**{name: 0.123})
         with pytest.raises(BadRequest, match=f"cannot change {name}") as caught:
-            reach(everything.start, everything.question, pose)
+            reach(all_samples.start, all_samples.observation_model, pose)
         assert caught.value.allowed == ", ".join(parts)
 
 
 def test_a_part_that_never_changes_may_be_given_as_it_is() -> None:
     """What is printed can be given back: z of a planar robot, the orientation of one that only translates."""
     for robot, text in (("3rrr_m1", "x=0.01,y=0.02,z=0,rpy=0/0/0.05"), ("delta", "x=0.05,y=0,z=-0.6,rpy=0/0/0")):
-        everything = setting_of(robot).everything
+        all_samples = setting_of(robot).all_samples
         wanted = Pose.parse(text)
-        at = reach(everything.start, everything.question, wanted)
-        X = at.pose(everything.question.platform)
+        at = reach(all_samples.start, all_samples.observation_model, wanted)
+        X = at.pose(all_samples.observation_model.platform)
         assert np.allclose(X[:3, 3], [wanted.x, wanted.y, wanted.z], atol=1e-9)
         assert np.allclose(X[:3, :3], wanted.rotation, atol=1e-9)
-    everything = setting_of("3rrr_m1").everything
+    all_samples = setting_of("3rrr_m1").all_samples
     with pytest.raises(BadRequest, match="one axis only"):
-        reach(everything.start, everything.question, Pose.parse("rpy=0.1/0/0"))
+        reach(all_samples.start, all_samples.observation_model, Pose.parse("rpy=0.1/0/0"))
 
 
 @pytest.mark.parametrize(
@@ -148,15 +148,15 @@ def test_a_part_that_never_changes_may_be_given_as_it_is() -> None:
 )
 def test_free_parts_are_nearest_to_zero(robot: str, text: str) -> None:
     """No configuration nearby with the same given parts lies nearer to the zero pose."""
-    setting = setting_of(robot)
-    everything, motion, pose = setting.everything, motion_of(setting), Pose.parse(text)
-    at = reach(everything.start, everything.question, pose, motion)
-    goal, twin = motion.goal(pose), at.twin
-    assert np.linalg.norm(goal.rows(twin, at.q)[0]) < CLOSED
+    setup = setting_of(robot)
+    all_samples, motion, pose = setup.all_samples, motion_of(setup), Pose.parse(text)
+    at = reach(all_samples.start, all_samples.observation_model, pose, motion)
+    goal, model = motion.goal(pose), at.model
+    assert np.linalg.norm(goal.error_and_jacobian(model, at.q)[0]) < CLOSED
 
     def distance(q: Array) -> float:
-        X = twin.pose(q, motion.link)
-        shift = (motion.position(X) - motion.position(motion.home)) / twin.length
+        X = model.pose(q, motion.link)
+        shift = (motion.position(X) - motion.position(motion.home)) / model.length
         turn = logarithm(X[:3, :3] @ motion.home[:3, :3].T) if motion.body else np.zeros(3)
         return float(np.linalg.norm([*shift, *turn]))
 
@@ -164,7 +164,7 @@ def test_free_parts_are_nearest_to_zero(robot: str, text: str) -> None:
     least, compared = distance(at.q), 0
     for _ in range(20):
         kernel, _ = at.kernel()
-        q, residual = solve(twin, twin.integrate(at.q, 1e-2 * kernel @ rng.normal(size=kernel.shape[1])), goal)
+        q, residual = solve(model, model.integrate(at.q, 1e-2 * kernel @ rng.normal(size=kernel.shape[1])), goal)
         if residual <= CLOSED:
             compared += 1
             assert distance(q) >= least - 1e-9
@@ -172,9 +172,9 @@ def test_free_parts_are_nearest_to_zero(robot: str, text: str) -> None:
 
 
 def test_the_empty_pose_is_the_zero_configuration() -> None:
-    everything = setting_of("3rrr_m1").everything
-    at = reach(everything.start, everything.question, Pose())
-    np.testing.assert_allclose(at.q, everything.start.q, atol=1e-12)
+    all_samples = setting_of("3rrr_m1").all_samples
+    at = reach(all_samples.start, all_samples.observation_model, Pose())
+    np.testing.assert_allclose(at.q, all_samples.start.q, atol=1e-12)
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.1, -0.15]))
@@ -182,11 +182,11 @@ def test_the_empty_pose_is_the_zero_configuration() -> None:
 def test_phi_of_a_planar_robot_is_about_its_normal(seed: int, angle: float) -> None:
     mechanism = planar(["RRR", "RPR", "RRR"], np.random.default_rng(seed), [{0}, {0}, {0}])
     normal = next(joint.axis for joint in mechanism.joints.values() if joint.type.value == "R")
-    setting = ObservedRobot.of(mechanism, samples=3)
-    motion = motion_of(setting)
+    setup = ObservedRobot.of(mechanism, samples=3)
+    motion = motion_of(setup)
     assert abs(abs(normal @ motion.normal) - 1) < 1e-9
     assert motion.normal[np.argmax(np.abs(motion.normal))] > 0
-    at = reach(setting.everything.start, setting.everything.question, Pose(phi=angle), motion)
+    at = reach(setup.all_samples.start, setup.all_samples.observation_model, Pose(phi=angle), motion)
     turn = at.pose("platform")[:3, :3] @ motion.home[:3, :3].T
     np.testing.assert_allclose(turn, exponential(angle * motion.normal), atol=1e-9)
 
@@ -194,17 +194,17 @@ def test_phi_of_a_planar_robot_is_about_its_normal(seed: int, angle: float) -> N
 def test_the_manner_of_a_platform_is_what_it_never_changes() -> None:
     """A planar robot keeps to its plane and its normal; a shift or a tilt out of it is an error."""
     mechanism = planar(["RRR", "RPR", "RRR"], np.random.default_rng(5), [{0}, {0}, {0}])
-    setting = ObservedRobot.of(mechanism, samples=3)
-    motion, twin = motion_of(setting), setting.everything.twin
+    setup = ObservedRobot.of(mechanism, samples=3)
+    motion, model = motion_of(setup), setup.all_samples.model
     manner = motion.manner()
     normal = next(joint.axis for joint in mechanism.joints.values() if joint.type.value == "R")
     np.testing.assert_allclose(np.abs(manner.directions @ normal), [1], atol=1e-9)
-    for member in setting.everything.members:
-        assert np.linalg.norm(manner.rows(twin, member.configuration.q)[0]) < 1e-9
+    for member in setup.all_samples.members:
+        assert np.linalg.norm(manner.error_and_jacobian(model, member.configuration.q)[0]) < 1e-9
     shifted = replace(manner, values=manner.values + 0.1)
-    assert np.linalg.norm(shifted.rows(twin, twin.q0)[0]) == pytest.approx(0.1 / twin.length)
+    assert np.linalg.norm(shifted.error_and_jacobian(model, model.q0)[0]) == pytest.approx(0.1 / model.length)
     tilted = replace(manner, zero=manner.zero @ exponential(np.array([0.1, -0.2, 0.15])))
-    assert np.linalg.norm(tilted.rows(twin, twin.q0)[0]) > 0.05
+    assert np.linalg.norm(tilted.error_and_jacobian(model, model.q0)[0]) > 0.05
     assert motion_of(setting_of("delta")).manner().rotation is not None
     assert len(motion_of(setting_of("gough_stewart")).manner().values) == 0
 
@@ -212,23 +212,23 @@ def test_the_manner_of_a_platform_is_what_it_never_changes() -> None:
 @given(parallel_robots())
 @quick
 def test_random_robots_reach_the_poses_of_their_samples(mechanism) -> None:
-    setting = ObservedRobot.of(mechanism, samples=3)
-    motion = motion_of(setting)
-    for member in setting.everything.members:
-        check_reached(setting, motion, member.way[0].pose)
+    setup = ObservedRobot.of(mechanism, samples=3)
+    motion = motion_of(setup)
+    for member in setup.all_samples.members:
+        check_reached(setup, motion, member.way[0].pose)
 
 
 @pytest.mark.some(6)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_what_rods_keep_away_is_not_reached(robot: str) -> None:
     """No pose that the robot takes is said to be beyond its rods; far away all are, where a chain has only centres."""
-    setting = setting_of(robot)
-    motion = motion_of(setting)
-    poses = [motion.goal(had(motion, member.configuration.pose(motion.link))) for member in setting.everything.members]
-    assert beyond_rods(setting.mechanism, motion, poses) == set()
+    setup = setting_of(robot)
+    motion = motion_of(setup)
+    poses = [motion.goal(had(motion, member.configuration.pose(motion.link))) for member in setup.all_samples.members]
+    assert beyond_rods(setup.mechanism, motion, poses) == set()
     if robot in ("rrrrr_m1", "3rrr_m1", "delta", "quattro"):
         far = motion.goal(replace(had(motion, motion.home), x=9.0))
-        assert beyond_rods(setting.mechanism, motion, [*poses, far]) == {len(poses)}
+        assert beyond_rods(setup.mechanism, motion, [*poses, far]) == {len(poses)}
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -236,9 +236,9 @@ def test_beyond_rods_is_beyond_the_circles_of_a_five_bar(seed: int) -> None:
     """Where its end is, two cranks and two rods tell by hand: both distances to the base joints."""
     rng = np.random.default_rng(seed)
     five = transformed(planar(["RRR", "RRR"], rng, [{0}, {0}], point=True), random_rotation(rng), rng.normal(size=3))
-    setting = ObservedRobot.of(five)
-    motion = motion_of(setting)
-    joints = [[setting.mechanism.joints[name].point for name in leg.joints] for leg in setting.anatomy.legs]
+    setup = ObservedRobot.of(five)
+    motion = motion_of(setup)
+    joints = [[setup.mechanism.joints[name].point for name in leg.joints] for leg in setup.decomposition.legs]
     end = motion.position(motion.home)
     across = motion.translations @ rng.uniform(-1.5, 1.5, (motion.translations.shape[1], 200))
     goals = [replace(motion.at_home(), values=end + each, phi=None, rotation=None) for each in across.T]
@@ -247,7 +247,7 @@ def test_beyond_rods_is_beyond_the_circles_of_a_five_bar(seed: int) -> None:
         crank, rod = np.linalg.norm(b - a), np.linalg.norm(end - b)
         far = np.linalg.norm(end + across.T - a, axis=1)
         inside &= (far <= crank + rod) & (far >= abs(crank - rod))
-    assert beyond_rods(setting.mechanism, motion, goals) == set(np.flatnonzero(~inside))
+    assert beyond_rods(setup.mechanism, motion, goals) == set(np.flatnonzero(~inside))
     assert 0 < inside.sum() < 200
 
 
@@ -273,11 +273,11 @@ FEET, CRANK, ROD = (np.array([-0.1, 0.0]), np.array([0.1, 0.0])), 0.16, 0.2
     ("x", "y", "leg"), [(-0.2, 0.28, "2"), (0.9, 0.1, "1"), (0.2, 0.28, "1"), (0.02, 0.5, "1"), (-0.03, 0.6, "2")]
 )
 def test_the_leg_that_misses_is_named(x: float, y: float, leg: str) -> None:
-    everything = setting_of("rrrrr_m1").everything
+    all_samples = setting_of("rrrrr_m1").all_samples
     misses = {label: np.linalg.norm([x, y] - foot) - (CRANK + ROD) for label, foot in zip("12", FEET, strict=True)}
     assert max(misses, key=misses.__getitem__) == leg
     with pytest.raises(PoseNotReached) as caught:
-        reach(everything.start, everything.question, Pose(x, y))
+        reach(all_samples.start, all_samples.observation_model, Pose(x, y))
     error = caught.value
     assert error.leg == leg
     assert error.millimetres == pytest.approx(1e3 * misses[leg], rel=1e-4)
@@ -294,9 +294,9 @@ def test_the_leg_that_misses_is_named(x: float, y: float, leg: str) -> None:
 @pytest.mark.parametrize(("x", "y", "z"), [(0.6, 0.1, -0.7), (0.02, 0.03, -0.3), (0, 0, -0.95), (-0.5, 0.3, -0.6)])
 def test_the_miss_of_a_leg_whose_platform_only_translates(x: float, y: float, z: float) -> None:
     """The rod's two ends: the elbow somewhere on its circle, the tip carried along without a turn."""
-    setting = setting_of("delta")
-    mechanism, misses = setting.mechanism, {}
-    for leg in setting.anatomy.legs:
+    setup = setting_of("delta")
+    mechanism, misses = setup.mechanism, {}
+    for leg in setup.decomposition.legs:
         joints = [mechanism.joints[name] for name in leg.joints]
         (shoulder,) = (joint for joint in joints if mechanism.base in joint.links)
         elbow = np.mean([joint.point for joint in joints if shoulder.successor == joint.predecessor], axis=0)
@@ -309,7 +309,7 @@ def test_the_miss_of_a_leg_whose_platform_only_translates(x: float, y: float, z:
         distances, rod = np.linalg.norm(np.array(circle) - wanted, axis=1), np.linalg.norm(tip - elbow)
         misses[leg.label] = max(distances.min() - rod, rod - distances.max(), 0.0)
     with pytest.raises(PoseNotReached) as caught:
-        reach(setting.everything.start, setting.everything.question, Pose(x, y, z))
+        reach(setup.all_samples.start, setup.all_samples.observation_model, Pose(x, y, z))
     assert caught.value.degrees < 1e-6
     assert caught.value.millimetres == pytest.approx(1e3 * max(misses.values()), rel=1e-4)
     assert misses[caught.value.leg] == pytest.approx(max(misses.values()), rel=1e-4)
@@ -317,9 +317,9 @@ def test_the_miss_of_a_leg_whose_platform_only_translates(x: float, y: float, z:
 
 def test_a_pose_that_each_leg_alone_can_take() -> None:
     """The planes of the three legs together keep a level platform from turning about z; one plane alone does not."""
-    everything = setting_of("3rps").everything
+    all_samples = setting_of("3rps").all_samples
     with pytest.raises(PoseNotReached) as caught:
-        reach(everything.start, everything.question, Pose(z=0.4, phi=0.02))
+        reach(all_samples.start, all_samples.observation_model, Pose(z=0.4, phi=0.02))
     assert caught.value.leg is None
     assert "each leg alone can close there" in str(caught.value)
     assert 0 <= caught.value.came < 1
@@ -327,12 +327,12 @@ def test_a_pose_that_each_leg_alone_can_take() -> None:
 
 def bend(at: ClosedConfiguration, leg: str) -> float:
     """The sine of the angle from crank to rod: its sign is the working mode of a leg."""
-    joints = at.twin.mechanism.joints
+    joints = at.model.mechanism.joints
     foot, elbow = joints[f"shoulder_{leg}"].point, at.pose(f"dist_{leg}")[:2, 3]
     tip = at.pose("dist_1")[:2, 3]
     elbow = (
         at.pose(f"prox_{leg}")
-        @ np.linalg.inv(at.twin.mechanism.links[f"prox_{leg}"].pose)
+        @ np.linalg.inv(at.model.mechanism.links[f"prox_{leg}"].pose)
         @ np.append(joints[f"elbow_{leg}"].point, 1)
     )[:2]
     a, b = elbow - foot[:2], tip - elbow
@@ -342,11 +342,11 @@ def bend(at: ClosedConfiguration, leg: str) -> float:
 def test_a_sweep_covers_the_workspace_in_one_working_mode() -> None:
     """What is reached lies within both rings; what is not has a neighbour out of them or lies on the rings' edge; no
     leg passes its stretched or folded position."""
-    everything = setting_of("rrrrr_m1").everything
-    start = everything.start
+    all_samples = setting_of("rrrrr_m1").all_samples
+    start = all_samples.start
     np.testing.assert_allclose(motion_of(setting_of("rrrrr_m1")).position(start.pose("dist_1"))[:2], [0.02, 0.24])
     grid = Grid.parse("x=-0.3:0.3:17,y=0.06:0.4:11")
-    found = sweep(start, everything.question, grid)
+    found = sweep(start, all_samples.observation_model, grid)
     assert len(found) == 17 * 11
     signs = [np.sign(bend(start, leg)) for leg in "12"]
     reached = 0
@@ -362,9 +362,9 @@ def test_a_sweep_covers_the_workspace_in_one_working_mode() -> None:
 
 def test_a_way_that_touches_a_fold_does_not_pass_it() -> None:
     """The column x = -0.06 touches the circle on which the first leg is folded; smooth motion would unfold it."""
-    everything = setting_of("rrrrr_m1").everything
-    signs = [np.sign(bend(everything.start, leg)) for leg in "12"]
-    found = sweep(everything.start, everything.question, Grid.parse("x=-0.08:-0.04:3,y=-0.05:0.2:15"))
+    all_samples = setting_of("rrrrr_m1").all_samples
+    signs = [np.sign(bend(all_samples.start, leg)) for leg in "12"]
+    found = sweep(all_samples.start, all_samples.observation_model, Grid.parse("x=-0.08:-0.04:3,y=-0.05:0.2:15"))
     assert sum(at is not None for at in found) > 25
     for at in found:
         assert at is None or [np.sign(bend(at, leg)) for leg in "12"] == signs
@@ -375,13 +375,13 @@ def test_a_way_that_touches_a_fold_does_not_pass_it() -> None:
 def test_a_straight_way_that_touches_a_fold_does_not_pass_it(length: float, side: int) -> None:
     """The way from zero touches the circle on which the first leg is folded and goes on: the elbow came to the other
     side in a step that ended on the fold, beyond it by rounding."""
-    everything = setting_of("rrrrr_m1").everything
+    all_samples = setting_of("rrrrr_m1").all_samples
     home, least = np.array([0.02, 0.24]), ROD - CRANK
     far = np.linalg.norm(home - FEET[0])
     turned = exponential(side * np.arcsin(least / far) * np.array([0.0, 0.0, 1.0]))[:2, :2]
     x, y = home + length * np.sqrt(far**2 - least**2) / far * turned @ (FEET[0] - home)
     with pytest.raises(PoseNotReached) as refused:
-        reach(everything.start, everything.question, Pose(float(x), float(y)))
+        reach(all_samples.start, all_samples.observation_model, Pose(float(x), float(y)))
     assert refused.value.came == pytest.approx(1 / length, abs=1e-2)
 
 
@@ -389,37 +389,37 @@ def test_a_straight_way_that_touches_a_fold_does_not_pass_it(length: float, side
 def test_nothing_is_reached_from_a_pose_on_a_fold() -> None:
     """At x=±0.06, y=0 a rod lies along its crank, 0.04 m from the base joint, to the last digit: the sweep came to it
     and went on with the elbow on the other side."""
-    everything = ObservedRobot.of("rrrrr_m1").everything
-    found = sweep(everything.start, everything.question, Grid.parse("x=-0.12:0.12:9,y=-0.12:0.06:13"))
+    all_samples = ObservedRobot.of("rrrrr_m1").all_samples
+    found = sweep(all_samples.start, all_samples.observation_model, Grid.parse("x=-0.12:0.12:9,y=-0.12:0.06:13"))
     bends = np.array([[bend(at, leg) for leg in "12"] for at in found if at is not None])
-    usual = [bend(everything.start, leg) for leg in "12"]
+    usual = [bend(all_samples.start, leg) for leg in "12"]
     folded = np.abs(bends) < 1e-4 * np.abs(usual)
     assert folded.any(axis=0).all()
     assert np.all(folded | (np.sign(bends) == np.sign(usual)))
 
 
 def test_a_sweep_finds_what_single_poses_find() -> None:
-    everything = setting_of("delta").everything
+    all_samples = setting_of("delta").all_samples
     grid = Grid.parse("x=-0.2:0.2:5,y=-0.2:0.2:4,z=-0.6")
-    found = sweep(everything.start, everything.question, grid)
+    found = sweep(all_samples.start, all_samples.observation_model, grid)
     for pose, at in zip(grid.poses(), found, strict=True):
-        alone = reach(everything.start, everything.question, pose)
+        alone = reach(all_samples.start, all_samples.observation_model, pose)
         assert at is not None
-        for link in at.twin.mechanism.links:
+        for link in at.model.mechanism.links:
             if link.startswith("arm"):
                 np.testing.assert_allclose(at.pose(link), alone.pose(link), atol=1e-8)
 
 
 def test_a_grid_out_of_reach_is_empty() -> None:
-    everything = setting_of("rrrrr_m1").everything
-    assert set(sweep(everything.start, everything.question, Grid.parse("x=2:3:3,y=2:3:3"))) == {None}
+    all_samples = setting_of("rrrrr_m1").all_samples
+    assert set(sweep(all_samples.start, all_samples.observation_model, Grid.parse("x=2:3:3,y=2:3:3"))) == {None}
 
 
 @pytest.mark.parametrize("degrees", [108, 110, 115])
 def test_on_the_edge_of_the_workspace_a_leg_is_stretched(degrees: float) -> None:
-    everything = setting_of("rrrrr_m1").everything
+    all_samples = setting_of("rrrrr_m1").all_samples
     x, y = FEET[1] + (CRANK + ROD) * np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees))])
-    at = reach(everything.start, everything.question, Pose(float(x), float(y)))
+    at = reach(all_samples.start, all_samples.observation_model, Pose(float(x), float(y)))
     assert abs(bend(at, "2")) < 1e-9
     assert abs(bend(at, "1")) > 0.1
 
@@ -427,14 +427,14 @@ def test_on_the_edge_of_the_workspace_a_leg_is_stretched(degrees: float) -> None
 def test_parts_that_depend_on_each_other_are_said_to() -> None:
     """Roll and pitch of the 3-RPS decide its yaw: half of tan ψ is known from the planes of its legs (M. Z. Huang,
     1987); the nearest pose that is told is one of these, and can be asked for."""
-    setting = setting_of("3rps")
-    everything = setting.everything
+    setup = setting_of("3rps")
+    all_samples = setup.all_samples
     words = "has 3 freedoms, and at zero and at a random configuration parts of this pose depend on each other"
     with pytest.raises(PoseNotReached, match=words) as refused:
-        reach(everything.start, everything.question, Pose.parse("z=0.32,rpy=0.1/0.05/0"))
+        reach(all_samples.start, all_samples.observation_model, Pose.parse("z=0.32,rpy=0.1/0.05/0"))
     assert "blocked" not in str(refused.value)
-    near = reach(everything.start, everything.question, Pose.parse(refused.value.last))
-    R = near.pose(motion_of(setting).link)[:3, :3] @ motion_of(setting).home[:3, :3].T
+    near = reach(all_samples.start, all_samples.observation_model, Pose.parse(refused.value.last))
+    R = near.pose(motion_of(setup).link)[:3, :3] @ motion_of(setup).home[:3, :3].T
     assert abs(R[0, 1] - R[1, 0]) < 1e-6
 
 
@@ -442,8 +442,8 @@ def test_a_grid_goes_on_where_the_nearest_pose_is_a_dead_end() -> None:
     """Level, the 3-RPS does not move its point sideways to first order; tilted by θ about one axis it is off by half
     its radius times 1 - cos θ (Huang), so poses aside are there: each is met alone, and by a grid about the level one.
     """
-    everything, motion = setting_of("3rps").everything, motion_of(setting_of("3rps"))
-    found = sweep(everything.start, everything.question, Grid.parse("x=-0.1:0.1:3,y=0,z=0.9"))
+    all_samples, motion = setting_of("3rps").all_samples, motion_of(setting_of("3rps"))
+    found = sweep(all_samples.start, all_samples.observation_model, Grid.parse("x=-0.1:0.1:3,y=0,z=0.9"))
     for x, at in zip((-0.1, 0.0, 0.1), found, strict=True):
         assert at is not None
         X = at.pose(motion.link)
@@ -455,34 +455,34 @@ def test_a_grid_goes_on_where_the_nearest_pose_is_a_dead_end() -> None:
 
 def test_one_part_does_not_depend_on_itself() -> None:
     """Huang: a 3-RPS does not turn about its normal at all."""
-    everything = setting_of("3rps").everything
+    all_samples = setting_of("3rps").all_samples
     with pytest.raises(PoseNotReached, match="at a random configuration none of them changes this part") as refused:
-        reach(everything.start, everything.question, Pose.parse("phi=0.02"))
+        reach(all_samples.start, all_samples.observation_model, Pose.parse("phi=0.02"))
     assert "depend on each other" not in str(refused.value)
 
 
 @pytest.mark.parametrize(("robot", "pose"), [("3rps", "x=0.5"), ("3rps", "x=0.5,z=0.8"), ("3rrp", "x=2")])
 def test_what_is_too_far_does_not_depend(robot: str, pose: str) -> None:
     """The point of the 3-RPS is never more than its radius aside (Huang), whatever depends to first order at zero."""
-    everything = setting_of(robot).everything
+    all_samples = setting_of(robot).all_samples
     with pytest.raises(PoseNotReached, match="each leg alone can close there") as refused:
-        reach(everything.start, everything.question, Pose.parse(pose))
+        reach(all_samples.start, all_samples.observation_model, Pose.parse(pose))
     assert "depend" not in str(refused.value)
     assert "changes this part" not in str(refused.value)
 
 
 def test_a_leg_without_a_way_to_a_pose_is_tried_all_the_same() -> None:
     """Where a leg's Jacobian has no full rank and the damping has gone to nearly nothing."""
-    everything = setting_of("3rps").everything
+    all_samples = setting_of("3rps").all_samples
     with pytest.raises(PoseNotReached):
-        reach(everything.start, everything.question, Pose.parse("y=0.5,phi=0.05"))
+        reach(all_samples.start, all_samples.observation_model, Pose.parse("y=0.5,phi=0.05"))
 
 
 def test_a_constraint_singularity_on_the_way_is_told() -> None:
     """The loops of the 3-UPU lose rank 0.36 m aside at this height; what is not reached is not 100 % of the way."""
-    everything = setting_of("3upu").everything
+    all_samples = setting_of("3upu").all_samples
     with pytest.raises(PoseNotReached, match="the loops lose rank") as refused:
-        reach(everything.start, everything.question, Pose.parse("x=0.18,y=0.31176914536239791,z=1.2"))
+        reach(all_samples.start, all_samples.observation_model, Pose.parse("x=0.18,y=0.31176914536239791,z=1.2"))
     assert "more than 99.9 % of the way" in str(refused.value)
     assert "100 %" not in str(refused.value)
 
@@ -494,11 +494,11 @@ def test_a_pose_is_not_reached_though_no_walk_leads_away(monkeypatch: pytest.Mon
         raise NotSampled("", 0, count, 10)
         yield start
 
-    setting = setting_of("3rps")
-    everything, motion = setting.everything, motion_of(setting)
-    monkeypatch.setattr("hrsynth.batch.reach.random_walk", none)
+    setup = setting_of("3rps")
+    all_samples, motion = setup.all_samples, motion_of(setup)
+    monkeypatch.setattr("hrsynth.batch.pose_continuation.random_walk", none)
     with pytest.raises(PoseNotReached) as refused:
-        reach(everything.start, everything.question, Pose.parse("phi=0.02"), motion)
+        reach(all_samples.start, all_samples.observation_model, Pose.parse("phi=0.02"), motion)
     assert "random configuration" not in str(refused.value)
 
 
@@ -519,13 +519,13 @@ def test_a_turn_that_two_others_make_together_is_reached(angles: str, tmp_path: 
         + '<hrsynth serial="true"><platform link="stem"/>'
         '<observe kind="direction" link="stem" axis="1 2 3"/></hrsynth></robot>'
     )
-    everything = ObservedRobot.of(str(file)).everything
+    all_samples = ObservedRobot.of(str(file)).all_samples
     grid = Grid.parse(f"phi={angles}")
-    for pose, at in zip(grid.poses(), sweep(everything.start, everything.question, grid), strict=True):
+    for pose, at in zip(grid.poses(), sweep(all_samples.start, all_samples.observation_model, grid), strict=True):
         assert at is not None
         assert pose.phi is not None
         assert turn_about(np.array([0.0, 0.0, 1.0]), at.pose("stem")[:3, :3])[0] == pytest.approx(pose.phi, abs=1e-9)
-        alone = reach(everything.start, everything.question, pose).pose("stem")[:3, :3]
+        alone = reach(all_samples.start, all_samples.observation_model, pose).pose("stem")[:3, :3]
         least = 2 * np.arctan(np.sqrt(np.tan(abs(pose.phi) / 2)))
         for R in (at.pose("stem")[:3, :3], alone):
             np.testing.assert_allclose(

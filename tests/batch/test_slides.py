@@ -54,28 +54,28 @@ def two_bars(rng: np.random.Generator, turned: bool) -> Mechanism:
 
 def batch_of(robot: str) -> tuple[ObservedRobot, Batch]:
     if robot in ("bar", "bar, turned"):
-        setting = ObservedRobot.of(two_bars(np.random.default_rng(7), robot == "bar, turned"), samples=4)
-        assert setting.batch is not None
-        return setting, setting.batch
+        setup = ObservedRobot.of(two_bars(np.random.default_rng(7), robot == "bar, turned"), samples=4)
+        assert setup.batch is not None
+        return setup, setup.batch
     return shipped_batch(robot)
 
 
 def slid(batch: Batch, at: ClosedConfiguration) -> list[float]:
     """The coordinates (m) of the batch's slides."""
-    twin = at.twin
-    return [float(twin.difference(twin.q0, at.q)[twin.coordinates[name][0]]) * twin.length for name in batch.slides]
+    model = at.model
+    return [float(model.difference(model.q0, at.q)[model.coordinates[name][0]]) * model.length for name in batch.slides]
 
 
 @pytest.mark.parametrize("robot", ["i4l", "bar", "bar, turned"])
 def test_with_its_slides_a_batch_is_the_closed_robot(robot: str) -> None:
     """Directions at configurations that Newton's method closes, and their rates in the motions that the loops allow,
     by Pinocchio: the legs on the link that slides depend on it, the others do not."""
-    setting, batch = batch_of(robot)
-    everything, (name,) = setting.everything, batch.slides
-    observed, platform = everything.question.observations[: setting.defaults], setting.mechanism.platform
+    setup, batch = batch_of(robot)
+    all_samples, (name,) = setup.all_samples, batch.slides
+    observed, platform = all_samples.observation_model.observations[: setup.defaults], setup.mechanism.platform
     legs = [each.leg for each in observed]
     assert set(batch.sliding) == {leg for leg, form in batch.legs.items() if form is None} != set()
-    walk = list(random_walk(everything.start, 8, seed=3, steps=4))
+    walk = list(random_walk(all_samples.start, 8, seed=3, steps=4))
     X, s = np.array([at.pose(platform) for at in walk]), np.array([slid(batch, at) for at in walk])
     assert np.ptp(s) > 0.01 * batch.length
     found = batch.evaluate(X, legs, slides=s)
@@ -84,15 +84,15 @@ def test_with_its_slides_a_batch_is_the_closed_robot(robot: str) -> None:
     for i, at in enumerate(walk):
         if not found.reached[i]:
             continue
-        twin, kernel = at.twin, at.kernel()[0]
+        model, kernel = at.model, at.kernel()[0]
         u = np.array([at.pose(each.link)[:3, :3] @ each.direction for each in observed])  # type: ignore[attr-defined]
         assert np.max(np.abs(found.directions[i] - u)) < CLOSE
-        moves = [twin.velocity(at.q, each.link)[3:] @ kernel for each in observed]  # type: ignore[attr-defined]
+        moves = [model.velocity(at.q, each.link)[3:] @ kernel for each in observed]  # type: ignore[attr-defined]
         rates = np.concatenate([np.cross(w.T, axis).T for w, axis in zip(moves, u, strict=True)])
-        own = twin.velocity(at.q, platform) @ kernel
+        own = model.velocity(at.q, platform) @ kernel
         own[:3] += np.cross(own[3:].T, X[i, :3, :3] @ batch.coordinates.point / batch.length).T
         own[:3] *= batch.length
-        y = np.vstack([np.linalg.lstsq(batch.span, own, rcond=1e-9)[0], kernel[twin.coordinates[name][0]]])
+        y = np.vstack([np.linalg.lstsq(batch.span, own, rcond=1e-9)[0], kernel[model.coordinates[name][0]]])
         assert np.max(np.abs(found.twists @ y - own)) < CLOSE
         assert np.max(np.abs(found.interaction_matrix[i] @ y - rates)) < CLOSE
         columns = found.interaction_matrix[i].reshape(len(legs), 3, d + 1)[:, :, d]

@@ -14,9 +14,9 @@ import pytest
 import hrsynth
 from catalog.stub import WORKERS, source
 from hrsynth.catalog import load
+from hrsynth.catalog.architecture_key import parse
 from hrsynth.catalog.build import build
 from hrsynth.catalog.drawing import drawing
-from hrsynth.catalog.words import parse
 from hrsynth.cli import execute
 from hrsynth.cli.progress import Progress
 from hrsynth.present.text.catalog import SHOWN, entries
@@ -195,7 +195,7 @@ def test_each_smallest_set_has_the_hidden_robot_of_its_legs(run, word: str, tmp_
     assert all(each["problem"] is None for each in data["smallest"])
     for each in data["smallest"]:
         counted = each["legs"] == data["entry"].get("modes_legs")
-        assert each["near"] == (len(hrsynth.modes(file, observe=each["legs"]).near) if counted else None)
+        assert each["near"] == (len(hrsynth.modes(file, observe=each["legs"]).near_modes) if counted else None)
     sets, told = [each["legs"] for each in data["smallest"]], hrsynth.legs(file).minimal
     assert sets == data["entry"]["minimal"]
     assert set(map(tuple, sets)) <= set(told)

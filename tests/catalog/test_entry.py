@@ -11,14 +11,14 @@ import pytest
 
 from hrsynth.analysis.derive import derive
 from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.catalog.architecture_key import ArchitectureKey, LegKey, parse
 from hrsynth.catalog.entry import entry, model
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.groups import GROUPS, words
 from hrsynth.catalog.groups.planar import chains
-from hrsynth.catalog.words import LegWord, RobotWord, parse
 from hrsynth.description import load
 from hrsynth.errors import BadRequest
-from hrsynth.kinematics.relation import relation
+from hrsynth.kinematics.velocity_relation import relation
 from oracle import Oracle
 
 SHIPPED = {
@@ -64,7 +64,7 @@ def test_an_entry_says_what_the_shipped_robot_says(name):
     hidden = None if robot.hidden_architecture is None else robot.hidden_architecture.ascii
     assert found["hidden"] == hidden
     assert (found["verdict"], found["rank"], found["dof"]) == (robot.verdict.verdict, robot.verdict.rank, robot.dof)
-    assert (found["mobility"], found["idle"]) == (robot.mobility.total, robot.mobility.idle)
+    assert (found["mobility"], found["idle"]) == (robot.mobility.total, robot.mobility.internal)
     assert found["exact"]
     assert found["driven"]
 
@@ -77,10 +77,10 @@ def _symmetric(platform, motors):
         if platform and letters[-1] != "R":
             continue
         for motor in range(motors):
-            leg = LegWord(
+            leg = LegKey(
                 tuple(joint.__class__(joint.letter, joint.axes, i == motor) for i, joint in enumerate(chain.joints))
             )
-            table[letters, motor] = entry(str(RobotWord.of([leg] * (2 if platform else 3), platform=platform)))
+            table[letters, motor] = entry(str(ArchitectureKey.of([leg] * (2 if platform else 3), platform=platform)))
     return table
 
 
@@ -150,9 +150,9 @@ def test_what_is_driven_changes_nothing_else():
     for text in random.Random(1).sample(can_be_driven, 3):
         word = parse(text)
         other = str(
-            RobotWord.of(
+            ArchitectureKey.of(
                 [
-                    LegWord(
+                    LegKey(
                         tuple(
                             joint.__class__(joint.letter, joint.axes, i == 0, joint.watched)
                             for i, joint in enumerate(leg.joints)
@@ -211,14 +211,14 @@ def test_screws_without_pinocchio_see_the_same(name):
         found = entry(text)
         if "refused" in found:
             continue
-        setting = ObservedRobot.of(mechanism(parse(text)), samples=1)
-        oracle = Oracle(setting.mechanism)
-        start, question = setting.everything.start, setting.everything.question
-        sets = [setting.segments, *([o for o in setting.segments if o.leg in each] for each in found["minimal"])]
+        setup = ObservedRobot.of(mechanism(parse(text)), samples=1)
+        oracle = Oracle(setup.mechanism)
+        start, question = setup.all_samples.start, setup.all_samples.observation_model
+        sets = [setup.segments, *([o for o in setup.segments if o.leg in each] for each in found["minimal"])]
         for state in (oracle.zero(), *oracle.random_walk(np.random.default_rng(1), 1)):
             assert oracle.mobility(state) == found["mobility"]
             for seen in sets:
-                point = setting.anatomy.point is not None
+                point = setup.decomposition.point is not None
                 basis = oracle.relation(state, seen, point_only=point)
                 size = 3 if point else 6
                 assert _rank(basis[:size]) == found["dof"]

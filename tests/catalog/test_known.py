@@ -11,11 +11,11 @@ import pytest
 
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.catalog import load
+from hrsynth.catalog.architecture_key import parse
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.groups import GROUPS
 from hrsynth.catalog.known import alias, aliases, bare, is_called, order
 from hrsynth.catalog.site.sentences import RULES, cure, rules
-from hrsynth.catalog.words import parse
 from hrsynth.cli import execute
 from hrsynth.rewrite.rules import rules as known_rules
 
@@ -74,7 +74,7 @@ def test_a_tripod_turns_about_two_axes_only_where_p_is_at_right_angles_to_r(seed
     """Hunt's 3-RPS lets each ball move in a plane across the R axis: the three forces that hold the platform are level,
     so that it can rise, and two turns are left. With P oblique to R each ball is on a cone, and three turns are."""
     for word, turns in (("3(Rt-Pk*-S)", 2), ("3(Rt-Pl*-S)", 3)):
-        twists = ObservedRobot.of(mechanism(parse(word), seed)).everything.members[0].relation.twists
+        twists = ObservedRobot.of(mechanism(parse(word), seed)).all_samples.members[0].relation.twists
         spins = np.linalg.svd(twists[3:])[1]
         assert np.sum(spins > 1e-6) == turns, (word, spins)
 

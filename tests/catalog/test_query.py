@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 import hrsynth
 from catalog.stub import CHAINS, QUESTIONS, REFUSED, VERDICTS, WORKERS, entry, source, without_checksum
 from hrsynth.catalog import Catalog, load
+from hrsynth.catalog.architecture_key import SENSORS, VERSION
 from hrsynth.catalog.build import build, check
 from hrsynth.catalog.conditions import FIELDS, places
 from hrsynth.catalog.jsonl import COUNTS, FLAGS, LISTS, Record, line, record, word_of
@@ -26,7 +27,6 @@ from hrsynth.catalog.jsonl import TEXTS as TEXT_FIELDS
 from hrsynth.catalog.known import is_called
 from hrsynth.catalog.query import values
 from hrsynth.catalog.store import Database, Folder, shipped_folder, write_tables
-from hrsynth.catalog.words import SENSORS, VERSION
 from hrsynth.cli import execute
 from hrsynth.errors import BadRequest
 

@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hrsynth
+from hrsynth.catalog.architecture_key import ArchitectureKey, JointSymbol, LegKey, parse
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.groups.spatial import translates, translational
-from hrsynth.catalog.words import JointSymbol, LegWord, RobotWord, parse
 from tables import catalog_says as says
 
 
@@ -31,9 +31,9 @@ def test_every_record_agrees_with_each_rule() -> None:
         assert some == every != "0"
 
 
-def _leg(letters: str, after: int, rail: bool) -> LegWord:
+def _leg(letters: str, after: int, rail: bool) -> LegKey:
     axes = iter("xj" if rail else "hj")
-    return LegWord(
+    return LegKey(
         tuple(
             JointSymbol(letter, "z" if letter == "R" else next(axes), watched=i == after)
             for i, letter in enumerate(letters)
@@ -42,12 +42,12 @@ def _leg(letters: str, after: int, rail: bool) -> LegWord:
 
 
 @st.composite
-def planar_legs(draw: st.DrawFn) -> LegWord:
+def planar_legs(draw: st.DrawFn) -> LegKey:
     letters = draw(st.sampled_from(["RRR", "RRP", "RPR", "PRR", "PPR", "PRP", "RPP"]))
     return _leg(letters, draw(st.sampled_from([0, 1])), letters[0] == "P" and draw(st.booleans()))
 
 
-def left_free(leg: LegWord, rng: np.random.Generator) -> np.ndarray:
+def left_free(leg: LegKey, rng: np.random.Generator) -> np.ndarray:
     """A basis (3, k) of the platform's twists (ω, vx, vy) while the link after the mark keeps its direction."""
     twists = []
     for joint in leg.joints:
@@ -60,23 +60,23 @@ def left_free(leg: LegWord, rng: np.random.Generator) -> np.ndarray:
 
 @settings(max_examples=300, deadline=None)
 @given(st.lists(planar_legs(), min_size=2, max_size=6), st.integers(0, 2**32 - 1))
-def test_the_theorem_on_planar_robots_is_that_of_their_twists(legs: list[LegWord], seed: int) -> None:
+def test_the_theorem_on_planar_robots_is_that_of_their_twists(legs: list[LegKey], seed: int) -> None:
     rng = np.random.default_rng(seed)
     seen = [np.linalg.svd(basis)[0][:, basis.shape[1] :].T for basis in (left_free(leg, rng) for leg in legs)]
-    assert np.linalg.matrix_rank(np.vstack(seen), tol=1e-7) == says.planar_rank(RobotWord("", (tuple(legs),)))
+    assert np.linalg.matrix_rank(np.vstack(seen), tol=1e-7) == says.planar_rank(ArchitectureKey("", (tuple(legs),)))
 
 
 TRANSLATING = [chain for chain in translational() if translates(chain)]
 
 
 @st.composite
-def translating_legs(draw: st.DrawFn) -> LegWord:
+def translating_legs(draw: st.DrawFn) -> LegKey:
     chain = draw(st.sampled_from(TRANSLATING))
     after = draw(st.integers(0, len(chain.joints) - 2))
-    return LegWord(tuple(replace(joint, watched=i == after) for i, joint in enumerate(chain.joints)))
+    return LegKey(tuple(replace(joint, watched=i == after) for i, joint in enumerate(chain.joints)))
 
 
-def seen_of_translations(leg: LegWord, rng: np.random.Generator) -> np.ndarray:
+def seen_of_translations(leg: LegKey, rng: np.random.Generator) -> np.ndarray:
     """The rates (3, 3) of the watched direction for the platform's three translations, from the twists of the joints:
     a slide that no turned link carries is normal to z."""
     turning = {name: rng.normal(size=3) for name in "ab"}
@@ -95,10 +95,10 @@ def seen_of_translations(leg: LegWord, rng: np.random.Generator) -> np.ndarray:
 
 @settings(max_examples=100, deadline=None)
 @given(st.lists(translating_legs(), min_size=1, max_size=5), st.integers(0, 2**32 - 1))
-def test_the_theorem_on_translations_is_that_of_their_twists(legs: list[LegWord], seed: int) -> None:
+def test_the_theorem_on_translations_is_that_of_their_twists(legs: list[LegKey], seed: int) -> None:
     rng = np.random.default_rng(seed)
     seen = np.vstack([seen_of_translations(leg, rng) for leg in legs])
-    assert np.linalg.matrix_rank(seen, tol=1e-7) == says.translation_rank(RobotWord("", (tuple(legs),)))
+    assert np.linalg.matrix_rank(seen, tol=1e-7) == says.translation_rank(ArchitectureKey("", (tuple(legs),)))
 
 
 def test_legs_translate_that_leave_all_translations_and_nothing_idle() -> None:
@@ -131,7 +131,7 @@ def test_the_rule_is_what_derive_finds(word: str) -> None:
 def test_the_observed_link_is_that_of_the_robot(word: str) -> None:
     """The mark of a word whose link is not told is that of the link that is watched."""
     for leg in parse(word).legs:
-        told = LegWord(
+        told = LegKey(
             tuple(JointSymbol(j.letter, j.axes, j.motor, i == says.mark(leg)) for i, j in enumerate(leg.joints))
         )
         assert told.canonical == leg.canonical

@@ -8,9 +8,9 @@ from itertools import product
 import numpy as np
 
 from hrsynth.catalog import load
+from hrsynth.catalog.architecture_key import LegKey, parse
 from hrsynth.catalog.groups import words
 from hrsynth.catalog.groups.schoenflies import sequences
-from hrsynth.catalog.words import LegWord, parse
 from hrsynth.geometry.vectors import Array
 from oracle import exponential
 
@@ -93,11 +93,11 @@ def test_the_group_has_each_leg_that_twists_allow() -> None:
     assert sum(1 + sum(joint != "P" for joint in cut[1:-1]) for cut in cuts) == len(listed) == len(set(listed))
 
 
-def letters_of(leg: LegWord) -> list[str]:
+def letters_of(leg: LegKey) -> list[str]:
     return [joint.letter if joint.letter == "P" else joint.axes for joint in leg.joints]
 
 
-def observed(leg: LegWord) -> int:
+def observed(leg: LegKey) -> int:
     """The joint after which the observed link follows: at the word's mark, else the link before the first P between two
     moving links, else the last link."""
     letters = letters_of(leg)

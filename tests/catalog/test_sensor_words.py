@@ -10,19 +10,19 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from hrsynth.catalog import load
+from hrsynth.catalog.architecture_key import ArchitectureKey, parse, sights
 from hrsynth.catalog.entry import entry
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.groups import group, words
 from hrsynth.catalog.jsonl import line
-from hrsynth.catalog.words import RobotWord, parse, sights
 from hrsynth.cli import execute
 from hrsynth.cli.schema import schema
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.so3 import exponential
 from hrsynth.geometry.vectors import pose
 from hrsynth.mechanism import Observation
+from hrsynth.mechanism.cameras import CameraObservation
 from hrsynth.mechanism.normal import normal_form
-from hrsynth.mechanism.sights import CameraObservation
 from oracle import Oracle
 
 LISTED = words("sensors")
@@ -138,4 +138,4 @@ def test_the_command_line_lists_and_shows_them(capsys: pytest.CaptureFixture[str
 
 def test_a_word_is_one_value():
     word = parse("3(Rz*-Rz-Rz)")
-    assert RobotWord.of(*map(list, word.bodies), seen=sights("2point")) == parse("3(Rz*-Rz-Rz)@2point")
+    assert ArchitectureKey.of(*map(list, word.bodies), seen=sights("2point")) == parse("3(Rz*-Rz-Rz)@2point")

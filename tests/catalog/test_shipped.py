@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from hrsynth.catalog import load
+from hrsynth.catalog.architecture_key import parse
 from hrsynth.catalog.build import check
 from hrsynth.catalog.groups import EVERY
 from hrsynth.catalog.store import shipped_folder
-from hrsynth.catalog.words import parse
 
 pytestmark = pytest.mark.skipif(not shipped_folder().groups(), reason="no catalog is shipped yet")
 LARGEST = 10_000_000

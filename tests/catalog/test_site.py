@@ -17,6 +17,7 @@ from lxml import etree
 import hrsynth
 from catalog.stub import WORKERS
 from hrsynth.catalog import Catalog
+from hrsynth.catalog.architecture_key import parse
 from hrsynth.catalog.entry import entry
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.jsonl import line, record
@@ -24,7 +25,6 @@ from hrsynth.catalog.site import Site, build, folder, site
 from hrsynth.catalog.site.index import LISTS, NUMBERS, TEXTS, columns, notation
 from hrsynth.catalog.site.pages import Study, page, study, write_pages
 from hrsynth.catalog.site.structures import Structure, address_name, structures
-from hrsynth.catalog.words import parse
 from hrsynth.cli import execute
 from hrsynth.errors import BadRequest, BuildStopped
 

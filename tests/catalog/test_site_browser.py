@@ -8,11 +8,11 @@ import pytest
 
 from browser import Tab
 from hrsynth.catalog import Catalog
+from hrsynth.catalog.architecture_key import parse
 from hrsynth.catalog.entry import entry
 from hrsynth.catalog.jsonl import line, record
 from hrsynth.catalog.site import index, site
 from hrsynth.catalog.site.structures import address_name, structures
-from hrsynth.catalog.words import parse
 from hrsynth.present.palette import colour, tint
 
 pytestmark = pytest.mark.browser

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hrsynth.catalog.architecture_key import COMPOSITE, ArchitectureKey, LegKey, parse
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.groups import GROUPS, group, words
-from hrsynth.catalog.words import COMPOSITE, LegWord, RobotWord, parse
 from hrsynth.errors import BadRequest
 from hrsynth.mechanism.legs import decompose
 from hrsynth.mechanism.normal import normal_form
@@ -75,16 +75,18 @@ def test_order_of_legs_and_choice_of_names_do_not_count(text, rng):
         rng.shuffle(renamed)
         bodies.append(renamed)
     rng.shuffle(bodies)
-    assert str(RobotWord.of(*bodies, platform=word.platform)) == text
+    assert str(ArchitectureKey.of(*bodies, platform=word.platform)) == text
     assert parse(str(word)) == word
 
 
 def _renamed(leg, rng):
     for kind in ("hjm", "abc"):
         to = "".join(rng.sample(kind, 3))
-        leg = LegWord(
+        leg = LegKey(
             tuple(
-                joint.__class__(joint.letter, joint.axes.translate(str.maketrans(kind, to)), joint.motor, joint.watched)
+                joint.__class__(
+                    joint.letter, joint.axes.translate(str.maketrans(kind, to)), joint.motor, joint.observed_axes
+                )
                 for joint in leg.joints
             )
         )
@@ -97,8 +99,8 @@ def _renamed(leg, rng):
 def test_a_mechanism_has_the_joints_of_its_word(name, number):
     word = parse(some(name)[number])
     drawn = mechanism(word)
-    anatomy = decompose(normal_form(drawn).mechanism)
-    assert anatomy.labels == tuple(str(k + 1) for k in range(len(word.legs)))
+    decomposition = decompose(normal_form(drawn).mechanism)
+    assert decomposition.labels == tuple(str(k + 1) for k in range(len(word.legs)))
     assert sum(joint.actuated for joint in drawn.joints.values()) == sum(
         j.motor for leg in word.legs for j in leg.joints
     )

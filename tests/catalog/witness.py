@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from hrsynth.catalog.architecture_key import parse
 from hrsynth.catalog.entry import model
 from hrsynth.catalog.geometry import mechanism
-from hrsynth.catalog.words import parse
 from hrsynth.geometry.vectors import Array, unit
 from hrsynth.mechanism.legs import decompose
 from hrsynth.mechanism.normal import normal_form
@@ -44,9 +44,11 @@ class Witness:
     @cached_property
     def watched(self) -> dict[str, Direction]:
         """The observed direction of each leg: what the word marks, else its last segment."""
-        anatomy = decompose(self.oracle.mechanism)
+        decomposition = decompose(self.oracle.mechanism)
         marked = {each.leg: each for each in self.oracle.mechanism.observations if isinstance(each, Direction)}
-        return {leg.label: marked.get(leg.label) or default_observation(anatomy, leg) for leg in anatomy.legs}
+        return {
+            leg.label: marked.get(leg.label) or default_observation(decomposition, leg) for leg in decomposition.legs
+        }
 
     @cached_property
     def states(self) -> list[Array]:

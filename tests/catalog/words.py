@@ -23,11 +23,11 @@ from pathlib import Path
 from typing import Any
 
 from hrsynth.analysis.observed import SAMPLES, ObservedRobot
+from hrsynth.catalog.architecture_key import ArchitectureKey, parse
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.groups import GROUPS
-from hrsynth.catalog.words import RobotWord, parse
 from hrsynth.errors import HrsynthError
-from hrsynth.kinematics.branch import Signature
+from hrsynth.kinematics.branch_tests import Signature
 
 OWN = 1000
 """Numbers of dimensions from here on are used by nothing else."""
@@ -48,23 +48,23 @@ def word(number: int) -> str:
         return str(one)
     legs = [leg for _ in range(3) for other in [parse(rng.choice(texts))] if not other.platform for leg in other.legs]
     count = rng.randint(2, 4)
-    return str(RobotWord.of([rng.choice([*one.legs, *legs]) for _ in range(count)]))
+    return str(ArchitectureKey.of([rng.choice([*one.legs, *legs]) for _ in range(count)]))
 
 
-def ranks(setting: ObservedRobot) -> list[int]:
+def ranks(setup: ObservedRobot) -> list[int]:
     """What each set of legs sees for certain at some sample; a sample near a singularity may leave it open."""
-    signatures = [Signature.of(member.relation) for member in setting.everything.members]
+    signatures = [Signature.of(member.relation) for member in setup.all_samples.members]
     return [max(low for low, _ in answers) for answers in zip(*(each.seen for each in signatures), strict=True)]
 
 
 def answer(text: str, dimensions: int, seed: int, samples: int) -> str:
     """The ranks of all leg sets for one seed, or how the robot is refused."""
     try:
-        setting = ObservedRobot.of(mechanism(parse(text), dimensions), samples=samples, seed=seed)
+        setup = ObservedRobot.of(mechanism(parse(text), dimensions), samples=samples, seed=seed)
     except HrsynthError as error:
         return f"{type(error).__name__}: {getattr(error, 'what', '')[:60]}"
-    counts = f"{setting.dof} {setting.mobility.total} {setting.everything.signature.motion}"
-    return f"{counts} {' '.join(map(str, ranks(setting)))}"
+    counts = f"{setup.dof} {setup.mobility.total} {setup.all_samples.signature.motion}"
+    return f"{counts} {' '.join(map(str, ranks(setup)))}"
 
 
 def robot(task: tuple[str, int, int, int]) -> dict[str, Any]:

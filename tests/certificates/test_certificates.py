@@ -31,8 +31,8 @@ from certificates.mutations import FALSE, false, means_the_same, scribbled
 from families.test_linkages import LISTED, drawn
 from hrsynth.analysis.modes.modes import AssemblyModes
 from hrsynth.analysis.modes.solve import solve
+from hrsynth.catalog.architecture_key import parse
 from hrsynth.catalog.geometry import mechanism
-from hrsynth.catalog.words import parse
 from hrsynth.certificates import verify_certificate as checker
 from hrsynth.certificates import verify_ranks
 from hrsynth.certificates.modes import of_systems
@@ -128,11 +128,11 @@ def displaced(record, mechanism, box) -> np.ndarray:
 def test_links_are_told_where_the_robot_closes(name):
     """Joints by screws, and the watched directions, at as many modes as are told to be assembled; nowhere else."""
     found = hrsynth.modes(hrsynth.load(name), list(ROBOTS[name]))
-    record, mechanism = json.loads(of(name)), found.setting.mechanism
+    record, mechanism = json.loads(of(name)), found.setup.mechanism
     boxes = [box for system in record["systems"] for box in system["boxes"] if "links" in box]
     assert len(boxes) == sum(mode.assembly in ("yes", "beyond limits") for mode in found.modes) > 0
     assert checker.verify(record).endswith(f"; the robot closes at {len(boxes)} of the real ones, to 1e-9")
-    oracle, watched = Oracle(mechanism), found.setting.samples.question.observations
+    oracle, watched = Oracle(mechanism), found.setup.samples.observation_model.observations
     states = [displaced(record, mechanism, box) for box in boxes]
     assert max(oracle.error(state) for state in states) < 1e-8
     seen = [oracle.directions(state, watched) for state in states]
@@ -309,8 +309,8 @@ def test_loops_of_planar_mechanisms(name):
     told = f"{len(found.modes)} real of {found.found.complex} complex poses, and no other"
     closed = f"; the robot closes at {len(found.modes)} of the real ones, to 1e-9" * ("assembly" in record)
     more = " (more than needed fits)" * (name == "more than needed")
-    assert hrsynth.verify(record, found.setting.robot) == told + more + closed
-    assert ("assembly" in record) == (not found.setting.mechanism.couplings)
+    assert hrsynth.verify(record, found.setup.robot) == told + more + closed
+    assert ("assembly" in record) == (not found.setup.mechanism.couplings)
     assert sum(attacked(looped(name), 20, 7).values()) == 20
 
 
@@ -347,7 +347,7 @@ def test_platforms_that_a_leg_carries_and_single_loops(name: str):
     found, record = chain_modes(name), json.loads(chained(name))
     (system,), count = record["systems"], CHAINS[name][1]
     assert system["kind"] == "chain"
-    told = hrsynth.verify(record, found.setting.robot)
+    told = hrsynth.verify(record, found.setup.robot)
     assert told.startswith(f"{count} complex poses, and no other")
     assert count == f"{len(found.modes)} real of {found.found.complex}"
     more = name == "both rods watched" or name in LISTED

@@ -141,26 +141,26 @@ class Motors:
 
     values: Mapping[str, float]
 
-    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
+    def error_and_jacobian(self, model: PinocchioModel, q: Array) -> tuple[Array, Array]:
         """Error and Jacobian."""
-        step = twin.difference(twin.q0, q)
-        J, error = np.zeros((len(self.values), twin.nv)), np.zeros(len(self.values))
+        step = model.difference(model.q0, q)
+        J, error = np.zeros((len(self.values), model.nv)), np.zeros(len(self.values))
         for k, (name, value) in enumerate(self.values.items()):
-            unit = twin.length if twin.mechanism.joints[name].type.slides else 1.0
-            (i,) = twin.coordinates[name]
+            unit = model.length if model.mechanism.joints[name].type.slides else 1.0
+            (i,) = model.coordinates[name]
             J[k, i], error[k] = 1.0, step[i] - value / unit
         return error, J
 
 
-def own_pose(twin: PinocchioModel, motors: Mapping[str, float], steps: int = 6) -> Array:
+def own_pose(model: PinocchioModel, motors: Mapping[str, float], steps: int = 6) -> Array:
     """The platform's pose (4, 4) by Pinocchio's model of the robot, led from zero in small steps."""
-    q = twin.q0
+    q = model.q0
     for s in np.linspace(0, 1, steps + 1)[1:]:
         q, left = solve(
-            twin, q, Motors({name: s * value for name, value in motors.items()}), tolerance=1e-14, iterations=60
+            model, q, Motors({name: s * value for name, value in motors.items()}), tolerance=1e-14, iterations=60
         )
         assert left < 1e-12
-    return twin.pose(q, twin.mechanism.platform)
+    return model.pose(q, model.mechanism.platform)
 
 
 def module_of(code: str) -> ModuleType:

@@ -19,11 +19,11 @@ from hrsynth.analysis.branch.carried_vectors import SweptChains, Total, add_bend
 from hrsynth.analysis.branch.loops import loop_system, residuals
 from hrsynth.budgets import NEWTON_STEPS_AT_RUN
 from hrsynth.codegen import convergence
+from hrsynth.codegen.branch_cells import TubedBranch
 from hrsynth.codegen.export import export
 from hrsynth.codegen.rounding import RoundedNumber
 from hrsynth.codegen.source import Source
 from hrsynth.codegen.trace import TracedFunction
-from hrsynth.codegen.tubes import TubedBranch
 from hrsynth.geometry.vectors import Array
 from hrsynth.present.text.robots import describe_export
 
@@ -201,7 +201,7 @@ def test_faces_of_cells_are_answered() -> None:
     """Where a branch fills a part of its box alone, all closed cells are answered."""
     robot = made("geared")
     found = export(robot, "numpy")
-    assert found.proof.parts[0].share < 0.9
+    assert found.proof.parts[0].volume_fraction < 0.9
     rng, q = np.random.default_rng(0), []
     for cell in found.proof.parts[0].cells:
         for axis, end in product(range(len(cell.low)), (cell.low, cell.high)):

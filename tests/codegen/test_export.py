@@ -31,9 +31,9 @@ from codegen.robots import (
     own_pose,
 )
 from hrsynth.analysis.branch.answer import Toggle
+from hrsynth.codegen.branch_cells import TubedBranch
 from hrsynth.codegen.export import ExportedCode, export
 from hrsynth.codegen.languages import namespace
-from hrsynth.codegen.tubes import TubedBranch
 from hrsynth.errors import BadRequest, NothingProved
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
@@ -54,9 +54,9 @@ def assert_agrees(robot: Mechanism, found: ExportedCode, made: ModuleType, count
     q = inside(found, count)
     status, _, R, p, rates = made.jacobians(q)
     assert np.all(status == made.OK)
-    twin = PinocchioModel(robot)
+    model = PinocchioModel(robot)
     for i in range(count):
-        X = own_pose(twin, dict(zip(found.proof.motors, q[i], strict=True)))
+        X = own_pose(model, dict(zip(found.proof.motors, q[i], strict=True)))
         np.testing.assert_allclose(R[i], X[:3, :3], atol=1e-12)
         np.testing.assert_allclose(p[i], X[:3, 3], atol=1e-12 * max(1.0, robot.length))
     h = 1e-6
@@ -214,9 +214,9 @@ def test_motors_of_a_pose_in_a_box_of_more_than_a_turn() -> None:
 
 def test_code_tells_where_motors_are_the_only_ones() -> None:
     found = exported(four_bar(), 0.4)
-    assert found.proof.back is not None
+    assert found.proof.injective_box is not None
     made = module_of(found.code)
-    (low,), (high,) = found.proof.back
+    (low,), (high,) = found.proof.injective_box
     assert made.unique([[low], [0.0], [high], [high + 1e-9], [np.nan]]).tolist() == [True, True, True, False, False]
     assert found.to_dict()["back"] == [[low], [high]]
 
@@ -298,7 +298,7 @@ def test_it_says_why_it_answers_in_no_more() -> None:
     found = exported(four_bar(1.0, bars), 3.0)
     (part,) = found.proof.parts
     text = str(found)
-    assert part.share < 1
+    assert part.volume_fraction < 1
     assert [f"at {part.motors[0]}={end.q[0]:.4g}" in text for end in part.toggles] == [True] * len(part.toggles)
     assert "can move while all motors rest" in text
     assert "\nends" not in str(exported(four_bar(), 0.4))
@@ -382,7 +382,7 @@ def test_what_is_refused() -> None:
 
 
 def test_what_is_watched_is_refused_before_the_proof(monkeypatch: pytest.MonkeyPatch) -> None:
-    from hrsynth.description.sights import parse_see, with_sights
+    from hrsynth.description.observation_text import parse_see, with_sights
 
     monkeypatch.setattr("hrsynth.codegen.export.branch", lambda *_: pytest.fail("the proof has begun"))
     robot = four_bar()

@@ -249,7 +249,7 @@ def test_ranges_are_those_of_the_file(name: str, tmp_path: Path):
     proof = hrsynth.branch(robot)
     assert proof.box == "limits of the file"
     for part in proof.parts:
-        np.testing.assert_allclose(part.asked, [[-2] * len(part.motors), [2] * len(part.motors)], atol=1e-12)
+        np.testing.assert_allclose(part.requested_box, [[-2] * len(part.motors), [2] * len(part.motors)], atol=1e-12)
 
 
 def test_a_box_without_the_zero_configuration_names_it(tmp_path: Path):

@@ -37,15 +37,15 @@ def along(low: Array, high: Array, count: int) -> Array:
 
 def own_poses(robot: Mechanism, motors: tuple[str, ...], q: Array) -> Array:
     """The platform's poses (n, 4, 4), each found from the one before; the first is led to from zero."""
-    twin, found = PinocchioModel(robot), np.zeros((len(q), 4, 4))
-    here = twin.q0
+    model, found = PinocchioModel(robot), np.zeros((len(q), 4, 4))
+    here = model.q0
     for s in np.linspace(0, 1, 20):
-        here, _ = solve(twin, here, Motors(dict(zip(motors, s * q[0], strict=True))), tolerance=1e-13)
+        here, _ = solve(model, here, Motors(dict(zip(motors, s * q[0], strict=True))), tolerance=1e-13)
     for k, row in enumerate(q):
-        here, left = solve(twin, here, Motors(dict(zip(motors, row, strict=True))), tolerance=1e-14, iterations=60)
+        here, left = solve(model, here, Motors(dict(zip(motors, row, strict=True))), tolerance=1e-14, iterations=60)
         assert left < 1e-12
-        found[k] = twin.pose(here, robot.platform)
-    np.testing.assert_allclose(found[-1], own_pose(twin, dict(zip(motors, q[-1], strict=True)), 40), atol=1e-11)
+        found[k] = model.pose(here, robot.platform)
+    np.testing.assert_allclose(found[-1], own_pose(model, dict(zip(motors, q[-1], strict=True)), 40), atol=1e-11)
     return found
 
 
@@ -151,7 +151,7 @@ def check_motors_of_poses(name: str, count: int) -> None:
     robot = hrsynth.load(name)
     found = export(robot, "numpy", box_of(robot, FORMS[name]))
     assert found.closed
-    assert found.proof.parts[0].share == 1.0
+    assert found.proof.parts[0].volume_fraction == 1.0
     made = module_of(found.code)
     low, high = found.proof.proved
     wider = 1.3 if len(low) < 4 else 1.06

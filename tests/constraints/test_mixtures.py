@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import sympy
 
+from hrsynth.constraints.closed_conditions import ClosedForm, closed_form
 from hrsynth.constraints.locked_legs import LockedLeg
-from hrsynth.constraints.mixtures import ClosedForm, closed_form
 from hrsynth.constraints.named_vectors import BodyPoint, BodyVector, CrossProduct
 from hrsynth.constraints.vector_algebra import evaluate
 

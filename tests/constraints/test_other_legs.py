@@ -7,7 +7,7 @@ import pytest
 import sympy
 
 from hrsynth.analysis.check import check
-from hrsynth.analysis.singularity.singular import Singularity, singular
+from hrsynth.analysis.singularity.singularities import Singularity, singularities
 from hrsynth.geometry.vectors import Array, hat, unit
 from hrsynth.kinematics.walking import random_walk
 from hrsynth.mechanism.builder import Builder
@@ -54,7 +54,7 @@ def test_a_common_translation_that_another_leg_forbids_is_not_lost() -> None:
     assert np.linalg.norm(np.cross(tangent(robot, state, oracle, 1), tangent(robot, state, oracle, 2))) < 1e-6
     basis = oracle.relation(state, list(robot.observations))
     assert np.linalg.svd(basis[6:], compute_uv=False)[-1] > 0.01  # both freedoms are seen
-    answer = singular(robot, ["rod_1", "rod_2"], points=60)
+    answer = singularities(robot, ["rod_1", "rod_2"], points=60)
     assert answer.condition is not None
     assert answer.condition.evaluate(answer.pattern.values_at([there]))[0] > 0.01
 
@@ -63,7 +63,7 @@ def test_a_common_translation_that_another_leg_forbids_is_not_lost() -> None:
 @pytest.mark.parametrize("legs", [["rod_1"], ["rod_2"]])
 def test_one_watched_leg_of_a_platform_on_a_table_has_a_condition(legs: list[str]) -> None:
     """Its tip moves on a circle that is not in the plane: one direction shows both freedoms."""
-    answer = singular(on_a_table(), legs, points=60)
+    answer = singularities(on_a_table(), legs, points=60)
     assert answer.checked is not None
     assert (answer.verdict.rank, answer.checked.disagreements) == (2, 0)
 
@@ -94,14 +94,14 @@ def turning_on_a_table(turns: tuple[float, ...]) -> Mechanism:
 
 def as_printed(answer: Singularity, state: Array, oracle: Oracle) -> float:
     """The determinant of the matrices that the answer says there are, from the places of cranks and tips."""
-    robot, where = answer.setting.mechanism, answer.to_dict()["where"]
+    robot, where = answer.setup.mechanism, answer.to_dict()["where"]
     assert {where[name] for name in where if name[0] in "JN"} == {
         text
-        for k in range(2, 2 + len(answer.question.observations))
+        for k in range(2, 2 + len(answer.observation_model.observations))
         for text in (f"[I, -[B{k}]x]", f"I - tau{k} tau{k}^T")
     }
     values = {}
-    for k, each in enumerate(answer.question.observations, 2):
+    for k, each in enumerate(answer.observation_model.observations, 2):
         number = int(each.link[-1])
         B = (oracle.pose(state, "platform") @ np.append(robot.joints[f"end_{number}"].point, 1.0))[:3] / oracle.length
         tau = tangent(robot, state, oracle, number)
@@ -119,11 +119,11 @@ def as_printed(answer: Singularity, state: Array, oracle: Oracle) -> float:
 def test_tips_that_leave_the_plane_of_motion_have_no_lines_in_it(turns: tuple[float, ...]) -> None:
     """The cranks' ends move in upright planes: what is printed vanishes with the rank of all screws, there alone."""
     robot = turning_on_a_table(turns)
-    answer = singular(robot, [f"rod_{k}" for k in range(1, 1 + len(turns))], points=20)
+    answer = singularities(robot, [f"rod_{k}" for k in range(1, 1 + len(turns))], points=20)
     assert answer.condition is not None
     assert "lines through" not in answer.words
     oracle = Oracle(robot)
-    for at in [*random_walk(answer.setting.everything.start, 20, seed=1), *(e.configuration for e in answer.examples)]:
+    for at in [*random_walk(answer.setup.all_samples.start, 20, seed=1), *(e.configuration for e in answer.examples)]:
         state = np.array([at.pose(link) for link in robot.links])
         basis = oracle.relation(state, list(robot.observations))
         left = np.linalg.svd(basis[6:], compute_uv=False)[-1]
@@ -149,6 +149,6 @@ def test_a_held_leg_that_stops_the_turn_in_the_plane_is_no_line_of_it() -> None:
     made.joint("end", "R", "rod_1", "platform", (0.2, 0.4, 0), axis=(0, 0, 1), loop=True)
     made.observe("bar", "bar", (0.8, 0.6, 0))
     made.observe("rod", "rod_1", (-0.7, -0.3, 0))
-    answer = singular(made.build("platform"), ["bar", "rod_1"], see=["encoder:rail"], points=20)
+    answer = singularities(made.build("platform"), ["bar", "rod_1"], see=["encoder:rail"], points=20)
     assert answer.checked is not None
     assert (answer.verdict.rank, answer.checked.disagreements) == (3, 0)

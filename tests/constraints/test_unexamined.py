@@ -15,7 +15,7 @@ from analysis.singularity.found import found
 from analysis.singularity.test_never_in_loops import Z, joint, loop
 from hrsynth.analysis.check import check
 from hrsynth.analysis.singularity.locus import locus
-from hrsynth.analysis.singularity.singular import singular
+from hrsynth.analysis.singularity.singularities import singularities
 from hrsynth.constraints.condition import Named
 from hrsynth.description import load
 from hrsynth.geometry.vectors import Array, hat, unit
@@ -56,9 +56,9 @@ def test_a_3_upu_loses_a_turn_where_its_two_watched_directions_are_not_parallel(
     answer = found("3upu", "1,2")
     assert answer.words == "the watched directions u1, u2 are parallel"
     posture = check("3upu", "1,2", at=LOST).postures[0]
-    robot, there = answer.setting.mechanism, posture.configuration
+    robot, there = answer.setup.mechanism, posture.configuration
     oracle, state = Oracle(robot), np.array([there.pose(link) for link in robot.links])
-    seen = tuple(o for o in answer.question.observations if isinstance(o, Direction))
+    seen = tuple(o for o in answer.observation_model.observations if isinstance(o, Direction))
     u, v = (oracle.pose(state, each.link)[:3, :3] @ each.direction for each in seen)
     assert np.linalg.norm(np.cross(u, v)) > 0.1
     values, right = np.linalg.svd(rows(robot, oracle, state, seen))[1:]
@@ -89,9 +89,9 @@ def test_a_3_puu_whose_platform_has_turned_loses_a_freedom_though_its_rails_are_
     for name, value in TURNED.items():
         turned.theta[0, file.coordinates[name]] = value
     turned = solve(file, file.loops, turned)[0]
-    robot = answer.setting.mechanism
+    robot = answer.setup.mechanism
     oracle, state = Oracle(robot), placed(file, turned, robot)
-    seen = tuple(o for o in answer.question.observations if isinstance(o, Direction))
+    seen = tuple(o for o in answer.observation_model.observations if isinstance(o, Direction))
     assert oracle.error(state) < 1e-9
     assert oracle.mobility(state) == oracle.mobility(oracle.zero()) == 3
     assert np.trace(oracle.pose(state, robot.platform)[:3, :3]) < 1  # by more than a right angle
@@ -125,7 +125,7 @@ def test_a_tool_at_the_dead_point_of_its_tie_turns_though_the_halves_rest(tmp_pa
     halves says that."""
     path = tmp_path / "robot.urdf"
     path.write_text(sliding_halves())
-    answer = singular(str(path), "1,4", points=20)
+    answer = singularities(str(path), "1,4", points=20)
     file = Robot.read(path)
     tool, tie = (np.subtract(*file.centres[link][1::-1]) for link in ("tool", "tie"))
     items, count = file.loops.items, len(file.loops.items.links)
@@ -135,12 +135,12 @@ def test_a_tool_at_the_dead_point_of_its_tie_turns_though_the_halves_rest(tmp_pa
         same=np.vstack([file.loops.same, [count, count + 1]]),
         items=Items(np.append(items.links, links), np.vstack([items.local, *local]), np.append(items.point, [0, 0])),
     )
-    robot = answer.setting.mechanism
+    robot = answer.setup.mechanism
     oracle, state = Oracle(robot), placed(file, solve(file, line, file.zero())[0], robot)
     assert oracle.error(state) < 1e-9
     assert oracle.mobility(state) == oracle.mobility(oracle.zero())
     assert all(np.allclose(oracle.pose(state, half)[:3, :3], np.eye(3)) for half in ("plate_12", "plate_34"))
-    seen = tuple(o for o in answer.question.observations if isinstance(o, Direction))
+    seen = tuple(o for o in answer.observation_model.observations if isinstance(o, Direction))
     basis = oracle.relation(state, seen)
     kernel = np.linalg.svd(basis[6:])[2][-1]
     assert np.linalg.norm(basis[6:] @ kernel) < 1e-9

@@ -77,7 +77,7 @@ def test_an_unknown_name_gets_close_matches(tmp_path: Path, monkeypatch: pytest.
 
 
 def test_the_shipped_robots_are_sorted_files():
-    robots = description.shipped()
+    robots = description.list_robots()
     assert list(robots) == sorted(robots)
     assert all(path.is_file() and path.stem == name for name, path in robots.items())
 

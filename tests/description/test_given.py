@@ -13,8 +13,8 @@ import pytest
 
 import hrsynth
 from description.foreign.examples import FILES, MJCF, URDF
-from hrsynth.description import load, shipped
-from hrsynth.errors import BadRequest, BadRobotFile, GuessedBase, GuessedPlatform, HrsynthError
+from hrsynth.description import list_robots, load
+from hrsynth.errors import AssumedBase, AssumedPlatform, BadRequest, BadRobotFile, HrsynthError
 from oracle import Oracle
 
 ONE_FILE = {
@@ -32,7 +32,7 @@ WAYS: dict[str, Callable[[str, Path], Any]] = {
 @pytest.fixture(autouse=True)
 def guesses_are_expected():
     with warnings.catch_warnings():
-        for kind in (GuessedBase, GuessedPlatform):
+        for kind in (AssumedBase, AssumedPlatform):
             warnings.simplefilter("ignore", kind)
         yield
 
@@ -40,7 +40,7 @@ def guesses_are_expected():
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("name", [*ONE_FILE, "native"])
 def test_a_robot_is_the_same_however_it_is_given(tmp_path: Path, name: str, way: str):
-    text = shipped()["3rrr_m1"].read_text() if name == "native" else ONE_FILE[name]
+    text = list_robots()["3rrr_m1"].read_text() if name == "native" else ONE_FILE[name]
     path = tmp_path / "robot.xml"
     path.write_text(text, encoding="utf-8")
     one, two = load(path), load(WAYS[way](text, path))
@@ -62,7 +62,7 @@ def test_a_file_that_was_read_in_part_or_changed_is_what_is_left_of_it(tmp_path:
 def test_options_are_for_text_too_and_questions_take_it():
     found = load(URDF["urdf+"], platform="bar", motors="a")
     assert (found.platform, [joint.name for joint in found.joints.values() if joint.actuated]) == ("bar", ["a"])
-    assert hrsynth.check(URDF["urdf+"]).setting.robot.name == "four_bar"
+    assert hrsynth.check(URDF["urdf+"]).setup.robot.name == "four_bar"
 
 
 @pytest.mark.parametrize(
@@ -120,11 +120,11 @@ def test_a_guess_of_the_base_is_a_warning_at_the_line_that_asks(ask: Callable[[s
         warnings.simplefilter("always")
         with suppress(BadRequest):
             ask(TWO_ROOTS)
-    found = [each for each in caught if each.category is GuessedBase]
+    found = [each for each in caught if each.category is AssumedBase]
     assert ["the base is link 'a'" in str(each.message) for each in found] == [True]
     assert found[0].filename == __file__
     with warnings.catch_warnings():
-        warnings.simplefilter("error", GuessedBase)
+        warnings.simplefilter("error", AssumedBase)
         load("3rrr_m1")
 
 

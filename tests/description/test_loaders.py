@@ -10,7 +10,7 @@ import pytest
 
 from description.samples import every_joint, with_rods
 from hrsynth.analysis.derive import derive
-from hrsynth.description import load, native, shipped, spanning
+from hrsynth.description import list_robots, load, native, spanning
 from hrsynth.errors import BadRequest
 from hrsynth.mechanism.model import JointType, Mechanism
 
@@ -26,7 +26,7 @@ ROBOTS = (
     }
     | {"free": every_joint([JointType.FREE, JointType.PRISMATIC], [JointType.SPHERICAL], 5)}
 )
-ROBOTS |= {name: load(path) for name, path in shipped().items()}
+ROBOTS |= {name: load(path) for name, path in list_robots().items()}
 
 
 @pytest.fixture(params=ROBOTS.values(), ids=ROBOTS)
@@ -68,7 +68,7 @@ def test_urdf_parser_py_loads_the_tree(robot: Mechanism):
 
 def test_an_object_of_yourdfpy_is_read_as_the_file_that_it_writes(tmp_path: Path):
     yourdfpy = pytest.importorskip("yourdfpy")
-    tree = yourdfpy.URDF.load(str(shipped()["rrrrr_m1"]), load_meshes=False)
+    tree = yourdfpy.URDF.load(str(list_robots()["rrrrr_m1"]), load_meshes=False)
     tree.write_xml_file(str(tmp_path / "tree.urdf"))
     said = {
         "close": "dist_1:dist_2@-0.16896249413879,0.10701250195374,0:revolute",
@@ -78,7 +78,7 @@ def test_an_object_of_yourdfpy_is_read_as_the_file_that_it_writes(tmp_path: Path
     found = load(tree, **said)
     assert found == load(tmp_path / "tree.urdf", **said)
     assert derive(found).hidden_architecture == derive(load("rrrrr_m1")).hidden_architecture
-    assert (found.file, found.sha256) == (str(shipped()["rrrrr_m1"]), None)
+    assert (found.file, found.sha256) == (str(list_robots()["rrrrr_m1"]), None)
     for other in (5, None, tree.robot):
         with pytest.raises(BadRequest, match=r"allowed: a path, .*, a yourdfpy\.URDF$"):
             load(other)

@@ -16,14 +16,14 @@ from hypothesis import strategies as st
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.cli import execute
 from hrsynth.description import load, native, save, spanning
-from hrsynth.description.sights import parse_camera, parse_see, with_sights
+from hrsynth.description.observation_text import parse_camera, parse_see, with_sights
 from hrsynth.errors import BadRequest, BadRobotFile
 from hrsynth.geometry.vectors import pose
+from hrsynth.mechanism.cameras import CameraObservation, NamedCamera
 from hrsynth.mechanism.model import Mechanism
 from hrsynth.mechanism.normal import normal_form
 from hrsynth.mechanism.observations import kinds
 from hrsynth.mechanism.observations.encoder import Encoder
-from hrsynth.mechanism.sights import CameraObservation, NamedCamera
 from strategies import random_direction, random_rotation
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "pages" / "files.md"
@@ -203,7 +203,7 @@ def test_commands_that_know_segments_only_say_so(
 @pytest.mark.parametrize(
     "words",
     [
-        "atlas",
+        "aspects",
         "path --start x=0 --goal x=0.01",
         "accuracy --noise 0.1deg,1mm",
         "derive",
@@ -227,8 +227,8 @@ def test_the_command_line_and_python_see_the_same(capsys: pytest.CaptureFixture[
     see[0] = words[1] = "eye=" + see[0]
     assert execute(["check", "gough_stewart", "--observe", "1", *words, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)["observed"]
-    setting = ObservedRobot.of("gough_stewart", "1", cameras, see=see)
-    assert told == [o.to_dict() for o in setting.observed]
+    setup = ObservedRobot.of("gough_stewart", "1", cameras, see=see)
+    assert told == [o.to_dict() for o in setup.observed]
     assert [(each["leg"], each["kind"], each["camera"]) for each in told] == [
         ("1", "direction", None),
         ("point_1", "point", "eye"),
@@ -236,7 +236,7 @@ def test_the_command_line_and_python_see_the_same(capsys: pytest.CaptureFixture[
         ("direction_1", "direction", None),
         ("encoder_1", "encoder", None),
     ]
-    point = setting.observed[1]
+    point = setup.observed[1]
     assert isinstance(point, CameraObservation)
     assert point.camera is not None
     np.testing.assert_allclose(point.camera.pose, parse_camera(cameras[0]).pose)

@@ -15,7 +15,7 @@ from description.foreign.examples import FILES
 from description.foreign.test_models import MODELS
 from description.foreign.test_package_robots import FILES as PACKAGED
 from hrsynth.cli import execute
-from hrsynth.description import formats, load, save, shipped, xml
+from hrsynth.description import formats, list_robots, load, save, xml
 from hrsynth.description.vocabulary import Vocabulary, misspelt
 from hrsynth.errors import BadRequest, BadRobotFile, HrsynthError
 
@@ -38,7 +38,7 @@ def document(file: Path) -> etree._Element | None:
 
 def real_files() -> list[Path]:
     models = [each for each in MODELS.rglob("*") if each.suffix in (".urdf", ".sdf", ".xml")] if MODELS.is_dir() else []
-    return [*shipped().values(), *sorted(models), *PACKAGED]
+    return [*list_robots().values(), *sorted(models), *PACKAGED]
 
 
 @pytest.mark.some(20)
@@ -57,7 +57,7 @@ def test_every_name_of_the_examples_of_all_formats_is_known(name: str):
 
 @pytest.mark.parametrize("ending", [".xml", ".sdf", ".urdf"])
 @pytest.mark.some(4)
-@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("name", list_robots())
 def test_every_name_that_is_written_is_known(name: str, ending: str, tmp_path: Path):
     save(load(name), tmp_path / f"robot{ending}")
     root = document(tmp_path / f"robot{ending}")
@@ -126,7 +126,7 @@ def mistype(data: st.DataObject, name: str) -> str:
 
 @pytest.mark.parametrize("ending", ENDINGS)
 @pytest.mark.some(4, 20)
-@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("name", list_robots())
 @settings(
     max_examples=15,
     deadline=None,
@@ -160,7 +160,7 @@ def test_a_mistyped_attribute_is_refused_or_changes_nothing(
 
 
 def test_a_mistyped_axis_is_refused_with_its_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
-    text = shipped()["3rrr_m1"].read_text()
+    text = list_robots()["3rrr_m1"].read_text()
     path = tmp_path / "robot.urdf"
     path.write_text(text.replace('<axis xyz="0 0 1"', '<axis xyx="0 0 1"', 1))
     assert execute(["check", str(path)]) == 2
@@ -183,7 +183,7 @@ def test_a_mistyped_key_beside_a_urdf_is_refused_with_its_line(wrong: str, tmp_p
 
 
 def test_another_unknown_name_is_said_once_and_names_of_other_programs_are_not(tmp_path: Path, capsys):
-    text = shipped()["3rrr_m1"].read_text()
+    text = list_robots()["3rrr_m1"].read_text()
     path = tmp_path / "robot.urdf"
     more = '<hydraulics/><hydraulics/><v:pump xmlns:v="urn:v" nmae="a"/><gazebo><sensr nmae="a"/></gazebo>'
     text = text.replace("<axis xyz", '<axis v:xyx="1" xmlns:v="u" xyz')

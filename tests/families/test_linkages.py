@@ -56,10 +56,10 @@ def check_mobility(name: str, seed: int) -> None:
     assert values[count - 1] < 1e-9 < values[count - 2]
     found = hrsynth.check(linkage.mechanism(name, zero, tilt))
     (posture,) = found.postures
-    assert (posture.mobility.total, posture.mobility.idle, posture.dof) == (1, 0, 1)
+    assert (posture.mobility.total, posture.mobility.internal, posture.dof) == (1, 0, 1)
     ((rows, loop),) = [(each.rows, each.loop) for each in found.redundant]
     assert rows == 7 - count
-    assert loop in found.setting.mechanism.joints
+    assert loop in found.setup.mechanism.joints
 
 
 LISTED = {
@@ -79,7 +79,7 @@ def check_modes(name: str, seed: int, starts: int) -> int:
     linkage, zero, tilt = drawn(name, seed)
     mechanism = linkage.mechanism(name, zero, tilt)
     found = hrsynth.modes(mechanism, real=True)
-    assert found.found.continuum is None
+    assert found.found.continuous_family is None
     assert found.found.complete
     assert len(found.modes) == LISTED[name]
     assert all(mode.assembly == "yes" for mode in found.modes)

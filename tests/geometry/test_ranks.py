@@ -24,9 +24,9 @@ from hrsynth.geometry.ranks import (
 from hrsynth.geometry.vectors import rotation_about
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
-from hrsynth.kinematics.relation import Measurement
 from hrsynth.kinematics.sampling import sample
 from hrsynth.kinematics.tasks import solve
+from hrsynth.kinematics.velocity_relation import ObservationModel
 from hrsynth.mechanism.builder import Builder
 from hrsynth.tolerances import CLOSED, RANK_GAP
 from kinematics.robots import setting_of
@@ -152,14 +152,14 @@ def test_planes_that_share_a_line() -> None:
 
 @pytest.mark.parametrize("robot", ["delta", "3rrr_m1", "gough_stewart", "3upu"])
 def test_an_open_loop_is_no_configuration(robot: str) -> None:
-    twin = setting_of(robot).everything.twin
-    step = np.random.default_rng(0).normal(scale=0.05, size=twin.nv)
-    q = twin.integrate(twin.q0, step)
+    model = setting_of(robot).all_samples.model
+    step = np.random.default_rng(0).normal(scale=0.05, size=model.nv)
+    q = model.integrate(model.q0, step)
     with pytest.raises(LoopsNotClosed) as caught:
-        ClosedConfiguration.of(twin, q)
-    worst, miss = twin.worst_loop(q)
+        ClosedConfiguration.of(model, q)
+    worst, miss = model.worst_loop(q)
     assert caught.value.loop == worst
-    assert worst in twin.mechanism.joints
+    assert worst in model.mechanism.joints
     assert repr(worst) in str(caught.value)
     assert caught.value.residual >= miss > CLOSED
     assert caught.value.exit_status == 3
@@ -167,49 +167,49 @@ def test_an_open_loop_is_no_configuration(robot: str) -> None:
 
 def test_the_loop_that_misses_is_named() -> None:
     """Only the joints of leg 2 are moved, so a loop of leg 2 is open."""
-    twin = setting_of("3rrr_m1").everything.twin
-    arms = [name for name in twin.coordinates if name.endswith("_2") and name not in twin.loops]
-    step = np.zeros(twin.nv)
+    model = setting_of("3rrr_m1").all_samples.model
+    arms = [name for name in model.coordinates if name.endswith("_2") and name not in model.loops]
+    step = np.zeros(model.nv)
     for name in arms:
-        step[list(twin.coordinates[name])] = 0.1
+        step[list(model.coordinates[name])] = 0.1
     with pytest.raises(LoopsNotClosed) as caught:
-        ClosedConfiguration.of(twin, twin.integrate(twin.q0, step))
+        ClosedConfiguration.of(model, model.integrate(model.q0, step))
     assert arms
-    assert caught.value.loop == twin.worst_loop(twin.integrate(twin.q0, step))[0]
+    assert caught.value.loop == model.worst_loop(model.integrate(model.q0, step))[0]
 
 
 def test_not_a_number_is_no_configuration() -> None:
-    twin = setting_of("delta").everything.twin
+    model = setting_of("delta").all_samples.model
     with pytest.raises(LoopsNotClosed):
-        ClosedConfiguration.of(twin, np.full_like(twin.q0, np.nan))
+        ClosedConfiguration.of(model, np.full_like(model.q0, np.nan))
 
 
 def test_configurations_are_read_only() -> None:
-    at = setting_of("delta").everything.start
+    at = setting_of("delta").all_samples.start
     with pytest.raises(ValueError):
         at.q[0] = 1.0
 
 
 @pytest.mark.parametrize("robot", ["delta", "quattro", "hexa", "3puu"])
 def test_open_loops_nearby_are_closed(robot: str) -> None:
-    twin = setting_of(robot).everything.twin
-    q, residual = solve(twin, twin.integrate(twin.q0, np.random.default_rng(3).normal(scale=0.02, size=twin.nv)))
+    model = setting_of(robot).all_samples.model
+    q, residual = solve(model, model.integrate(model.q0, np.random.default_rng(3).normal(scale=0.02, size=model.nv)))
     assert residual < CLOSED
-    assert ClosedConfiguration.of(twin, q).residual < CLOSED
-    assert np.max(np.abs(q - twin.q0)) > 1e-3
+    assert ClosedConfiguration.of(model, q).residual < CLOSED
+    assert np.max(np.abs(q - model.q0)) > 1e-3
 
 
 @pytest.mark.parametrize("robot", ["delta", "3rrr_m2", "prrrp_parallel_point"])
 def test_targets_are_reached(robot: str) -> None:
     """The pose and the directions of one configuration lead another start to it, idle motions apart."""
-    everything = setting_of(robot).everything
-    at = everything.members[0].configuration
-    target = everything.members[0].way[-1]
-    q, residual = everything.twin.q0, 1.0
-    for each in everything.members[0].way:
-        q, residual = solve(everything.twin, q, each, iterations=100)
+    all_samples = setting_of(robot).all_samples
+    at = all_samples.members[0].configuration
+    target = all_samples.members[0].way[-1]
+    q, residual = all_samples.model.q0, 1.0
+    for each in all_samples.members[0].way:
+        q, residual = solve(all_samples.model, q, each, iterations=100)
     assert residual < CLOSED
-    reached = ClosedConfiguration.of(everything.twin, q)
+    reached = ClosedConfiguration.of(all_samples.model, q)
     for observation, wanted in target.measured:
         value = observation.value(reached.pose(target.reference), reached.pose(observation.link))
         np.testing.assert_allclose(value, wanted, atol=1e-9)
@@ -220,8 +220,8 @@ def test_targets_are_reached(robot: str) -> None:
 
 
 def test_samples_are_the_same_for_the_same_seed() -> None:
-    everything = setting_of("3rrr_m1").everything
-    one, two, other = (sample(everything.twin, everything.question, 2, seed) for seed in (7, 7, 8))
+    all_samples = setting_of("3rrr_m1").all_samples
+    one, two, other = (sample(all_samples.model, all_samples.observation_model, 2, seed) for seed in (7, 7, 8))
     for a, b, c in zip(one.members, two.members, other.members, strict=True):
         np.testing.assert_array_equal(a.configuration.q, b.configuration.q)
         assert np.max(np.abs(a.configuration.q - c.configuration.q)) > 1e-3
@@ -238,7 +238,7 @@ def test_nothing_to_sample() -> None:
     builder.observe("1", "left", (1, 1, 0))
     mechanism = builder.build(platform="right")
     with pytest.raises(BadMechanism, match="let no link move"):
-        sample(PinocchioModel(mechanism), Measurement("right", None, "base", mechanism.observations), 2)
+        sample(PinocchioModel(mechanism), ObservationModel("right", None, "base", mechanism.observations), 2)
 
 
 @quick

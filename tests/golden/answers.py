@@ -17,11 +17,11 @@ import numpy as np
 from PIL import Image
 
 import hrsynth
-from hrsynth.analysis.asked import observe
+from hrsynth.analysis.pose_requests import observe
 from hrsynth.catalog.entry import entry
 from hrsynth.catalog.query import load as catalog
 from hrsynth.cli import execute
-from hrsynth.description import shipped
+from hrsynth.description import list_robots
 from hrsynth.errors import HrsynthError
 
 MODELS = Path(os.environ.get("HRSYNTH_MODELS") or Path(__file__).resolve().parents[3] / "shared" / "models")
@@ -30,14 +30,14 @@ COMMANDS = (
     "derive",
     "legs",
     "check",
-    "singular",
+    "singularities",
     "advise",
     "branch",
     "modes",
-    "atlas",
+    "aspects",
     "path",
     "servo",
-    "endings",
+    "equilibria",
     "basins",
     "accuracy",
     "select",
@@ -57,33 +57,33 @@ ABOUT_ROBOTS: dict[str, tuple[str, ...]] = {
     "derive": (),
     "legs": (),
     "check": (),
-    "singular": (),
+    "singularities": (),
     "advise": (),
     "modes": (),
     "modes --real": (),
-    "atlas": (),
+    "aspects": (),
     "accuracy": ("--cone", "0.1deg"),
-    "endings": (),
+    "equilibria": (),
     "path": ("--start", "{far}", "--goal", "{home}"),
     "servo": ("--start", "{near}", "--goal", "{home}"),
     "select": ("--start", "{near}", "--goal", "{home}"),
     "lint": (),
 }
 """Commands about one robot, with what else they are given: its pose, one beside it, and one at random."""
-FROM_PYTHON = ("derive", "legs", "check", "singular", "advise", "modes", "atlas")
+FROM_PYTHON = ("derive", "legs", "check", "singularities", "advise", "modes", "aspects")
 BRANCHES = {"rrrrr_m1": ("--box", "shoulder_1=-0.1:0.1,shoulder_2=-0.1:0.1")}
 DIALECTS = {"urdf": ".urdf", "mjcf": ".xml", "sdf": ".sdf", "gepetto": ".yaml", "usd": ".usda"}
 PICTURES = {
     "derive": ("derive", "quattro", "--observe", "1,4"),
     "check": ("check", "quattro", "--grid", "x=-0.3:0.3:9,z=-0.7"),
-    "singular": ("singular", "quattro", "--observe", "1,4", "--plane", "z=-0.7,phi=0"),
-    "singular of a plane": ("singular", "3rrr_m1", "--plane", "phi=0"),
+    "singularities": ("singularities", "quattro", "--observe", "1,4", "--plane", "z=-0.7,phi=0"),
+    "singularities of a plane": ("singularities", "3rrr_m1", "--plane", "phi=0"),
     "modes": ("modes", "3rrr_m1", "--real"),
     "modes in space": ("modes", "quattro", "--observe", "1,3"),
-    "atlas": ("atlas", "3rrr_m1"),
+    "aspects": ("aspects", "3rrr_m1"),
     "servo": ("servo", "delta", "--start", "x=0", "--goal", "x=0.05"),
     "servo in a plane": ("servo", "3rrr_m1", "--start", "x=0", "--goal", "x=0.03"),
-    "endings": ("endings", "3rrr_m1"),
+    "equilibria": ("equilibria", "3rrr_m1"),
     "basins": ("basins", "rrrrr_m1", "--to", "x=0", "--grid", "x=-0.05:0.05:5,y=0.2"),
     "accuracy": ("accuracy", "delta", "--cone", "0.1deg", "--plane", "z=-0.6"),
 }
@@ -91,7 +91,7 @@ ENTRIES, SEED, PIXELS = 500, 7, 48
 
 MOST = 60
 """Records of a list of which all are kept; of more their number is."""
-LONG = {"endings of stewart-sdf-ritwik/stewart_sdf.sdf"}
+LONG = {"equilibria of stewart-sdf-ritwik/stewart_sdf.sdf"}
 """Cases that take more than half an hour."""
 
 Json = Any
@@ -113,7 +113,7 @@ class Case:
 
 def files() -> dict[str, str]:
     """The shipped robots by name, and the files of others that are here by their place in the folder."""
-    found = {name: name for name in shipped()}
+    found = {name: name for name in list_robots()}
     if MODELS.is_dir():
         found |= {
             str(path.relative_to(MODELS)): str(path)
@@ -173,11 +173,11 @@ def run(argv: Sequence[str]) -> tuple[int, str, str]:
 def poses(file: str) -> dict[str, str]:
     """The robot's pose, one beside it, and that of a sample; the first for all where there is no other."""
     try:
-        setting = observe(hrsynth.load(file))
+        setup = observe(hrsynth.load(file))
     except HrsynthError:
         return dict.fromkeys(("home", "near", "far"), "x=0")
-    home = setting.motion.pose(setting.robot.links[setting.motion.link].pose)
-    far = setting.motion.pose(setting.configurations[0].pose(setting.motion.link))
+    home = setup.motion.pose(setup.robot.links[setup.motion.link].pose)
+    far = setup.motion.pose(setup.configurations[0].pose(setup.motion.link))
     near = next(
         (
             f"{part}={getattr(home, part) + 0.01!r}"
@@ -191,7 +191,7 @@ def poses(file: str) -> dict[str, str]:
 
 def answer(case: Case) -> Json:
     """What is kept of a case."""
-    hrsynth.forget()
+    hrsynth.clear_cache()
     if case.kind == "entry":
         return {"record": entry(case.name)}
     with tempfile.TemporaryDirectory() as folder:

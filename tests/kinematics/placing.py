@@ -54,12 +54,12 @@ def miss(
 def _ways(
     link: str, leg: Leg, joints: list[Joint], places: Mapping[str, range], been: frozenset[str]
 ) -> Iterator[list[Screw]]:
-    if link == leg.attach:
+    if link == leg.platform_link:
         yield []
         return
     for joint in joints:
         far = joint.other(link) if link in joint.links else link
-        if far not in been and (far == leg.attach or far in leg.links):
+        if far not in been and (far == leg.platform_link or far in leg.links):
             for rest in _ways(far, leg, joints, places, been | {far}):
                 yield _screws(joint, joint.predecessor == link, places[joint.name]) + rest
 

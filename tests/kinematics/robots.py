@@ -9,17 +9,17 @@ import numpy as np
 
 from hrsynth.analysis.derive import Derivation, derive
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.description import load, shipped
+from hrsynth.description import list_robots, load
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
-from hrsynth.kinematics.relation import Measurement
-from hrsynth.kinematics.tasks import Target, solve
+from hrsynth.kinematics.tasks import PoseAndValuesTask, solve
+from hrsynth.kinematics.velocity_relation import ObservationModel
 from hrsynth.mechanism.model import Mechanism
 from hrsynth.mechanism.observation import Observation
 from oracle import Oracle, span
 
-ROBOTS = tuple(shipped())
+ROBOTS = tuple(list_robots())
 
 
 @cache
@@ -38,29 +38,29 @@ def derived(
     return derive(load(robot), observe, camera, form=form)
 
 
-def state_of(twin: PinocchioModel, q: Array) -> Array:
+def state_of(model: PinocchioModel, q: Array) -> Array:
     """The oracle's state for a configuration of the twin: the poses of all links."""
-    return np.array([twin.pose(q, name) for name in twin.mechanism.links])
+    return np.array([model.pose(q, name) for name in model.mechanism.links])
 
 
-def walked(twin: PinocchioModel, seed: int = 0, steps: int = 4, size: float = 0.15) -> ClosedConfiguration:
+def walked(model: PinocchioModel, seed: int = 0, steps: int = 4, size: float = 0.15) -> ClosedConfiguration:
     """A closed configuration some random steps away from zero."""
     rng = np.random.default_rng(seed)
-    at = ClosedConfiguration.of(twin, twin.q0)
+    at = ClosedConfiguration.of(model, model.q0)
     for _ in range(steps):
         kernel, _ = at.kernel()
-        q, _ = solve(twin, twin.integrate(at.q, size * kernel @ rng.normal(size=kernel.shape[1])), tolerance=1e-13)
-        at = ClosedConfiguration.of(twin, q)
+        q, _ = solve(model, model.integrate(at.q, size * kernel @ rng.normal(size=kernel.shape[1])), tolerance=1e-13)
+        at = ClosedConfiguration.of(model, q)
     return at
 
 
-def seen_by_oracle(oracle: Oracle, state: Array, question: Measurement, length: float) -> Array:
+def seen_by_oracle(oracle: Oracle, state: Array, observation_model: ObservationModel, length: float) -> Array:
     """The relation by the oracle, with zero rows for observed links that are not in its mechanism."""
-    present = [o for o in question.observations if o.link in oracle.mechanism.links]
-    basis = oracle.relation(state, present, unit_length=length, point_only=question.point is not None)
-    blocks = [basis[: question.twist_rows]]
-    row = question.twist_rows
-    for each in question.observations:
+    present = [o for o in observation_model.observations if o.link in oracle.mechanism.links]
+    basis = oracle.relation(state, present, unit_length=length, point_only=observation_model.point is not None)
+    blocks = [basis[: observation_model.twist_rows]]
+    row = observation_model.twist_rows
+    for each in observation_model.observations:
         if each in present:
             blocks.append(basis[row : row + 3])
             row += 3
@@ -69,7 +69,9 @@ def seen_by_oracle(oracle: Oracle, state: Array, question: Measurement, length: 
     return span(np.vstack(blocks)) if basis.shape[1] else np.vstack(blocks)
 
 
-def led(mechanism: Mechanism, question: Measurement, way: Sequence[Target]) -> tuple[Oracle, Array]:
+def led(
+    mechanism: Mechanism, observation_model: ObservationModel, way: Sequence[PoseAndValuesTask]
+) -> tuple[Oracle, Array]:
     """The oracle of a mechanism, led from zero along the poses and directions of a way, and the state it reaches.
 
     Raises ``oracle.NotAssembled`` where it cannot follow.

@@ -10,76 +10,76 @@ import pytest
 
 import hrsynth
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.description import load, shipped
+from hrsynth.description import list_robots, load
 from hrsynth.geometry.vectors import pose, unit
 from hrsynth.kinematics.assembly import Assembler
 from hrsynth.kinematics.configuration import ClosedConfiguration, measure
-from hrsynth.kinematics.limits import SINGLE, Stops
+from hrsynth.kinematics.limits import SINGLE, CoordinateIntervals
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import JointType, Limits
 
-ROBOTS = sorted(shipped())
+ROBOTS = sorted(list_robots())
 
 
 def prepared(name: str) -> ObservedRobot:
-    return ObservedRobot.of(load(shipped()[name]), samples=3)
+    return ObservedRobot.of(load(list_robots()[name]), samples=3)
 
 
-def assembler(setting: ObservedRobot) -> Assembler:
-    return Assembler(setting.anatomy, setting.everything.twin.length, setting.everything.question.reference)
+def assembler(setup: ObservedRobot) -> Assembler:
+    return Assembler(setup.decomposition, setup.all_samples.model.length, setup.all_samples.observation_model.reference)
 
 
-def bodies(setting: ObservedRobot, at: ClosedConfiguration) -> dict[str, np.ndarray]:
-    return {leg.attach: at.pose(leg.attach) for leg in setting.anatomy.legs}
+def bodies(setup: ObservedRobot, at: ClosedConfiguration) -> dict[str, np.ndarray]:
+    return {leg.platform_link: at.pose(leg.platform_link) for leg in setup.decomposition.legs}
 
 
-def values(at: ClosedConfiguration, setting: ObservedRobot) -> list[np.ndarray]:
-    question = setting.everything.question
-    return measure(at.twin, at.q, question.reference, question.observations)[2]
+def values(at: ClosedConfiguration, setup: ObservedRobot) -> list[np.ndarray]:
+    observation_model = setup.all_samples.observation_model
+    return measure(at.model, at.q, observation_model.reference, observation_model.observations)[2]
 
 
 @pytest.mark.some(6)
 @pytest.mark.parametrize("name", ROBOTS)
 def test_a_reachable_pose_is_assembled_with_its_directions(name: str):
     """At random configurations the robot is found again: bodies, platform and directions, loops closed."""
-    setting = prepared(name)
-    build = assembler(setting)
-    for member in setting.everything.members:
+    setup = prepared(name)
+    build = assembler(setup)
+    for member in setup.all_samples.members:
         there = member.configuration
-        wanted = values(there, setting)
-        observations = setting.everything.question.observations
-        found = build.at(bodies(setting, there), list(zip(observations, wanted, strict=True)))
+        wanted = values(there, setup)
+        observations = setup.all_samples.observation_model.observations
+        found = build.at(bodies(setup, there), list(zip(observations, wanted, strict=True)))
         assert found.reachable, found.open
         assert found.configuration is not None
-        platform = setting.mechanism.platform
-        if setting.anatomy.point is None:
+        platform = setup.mechanism.platform
+        if setup.decomposition.point is None:
             assert found.configuration.pose(platform) == pytest.approx(there.pose(platform), abs=1e-8)
-        for mine, theirs in zip(values(found.configuration, setting), wanted, strict=True):
+        for mine, theirs in zip(values(found.configuration, setup), wanted, strict=True):
             assert mine == pytest.approx(theirs, abs=1e-8)
 
 
 @pytest.mark.some(3)
 @pytest.mark.parametrize("name", ["3rrr_m1", "delta", "quattro", "rrrrr_m1", "orthoglide"])
 def test_a_pose_far_away_names_the_legs_that_do_not_close(name: str):
-    setting = prepared(name)
-    far = {body: pose((50.0, 0.0, 0.0)) @ X for body, X in bodies(setting, setting.everything.start).items()}
-    found = assembler(setting).at(far, ())
+    setup = prepared(name)
+    far = {body: pose((50.0, 0.0, 0.0)) @ X for body, X in bodies(setup, setup.all_samples.start).items()}
+    found = assembler(setup).at(far, ())
     assert not found.reachable
     assert found.configuration is None
-    crowd = {leg.label for leg in setting.anatomy.legs}
+    crowd = {leg.label for leg in setup.decomposition.legs}
     assert found.open
     assert set(found.open) <= crowd
 
 
 def test_limits_of_joints_are_kept():
     """A slider that would have to leave its range is named; in a range that holds the pose it is not."""
-    robot = load(shipped()["gough_stewart"])
+    robot = load(list_robots()["gough_stewart"])
     sliders = [joint for joint in robot.joints.values() if joint.type is JointType.PRISMATIC]
     for upper, reachable in ((0.01, True), (-0.01, False)):
         limited = replace(sliders[0], limits=Limits(lower=-0.2, upper=upper))
-        setting = ObservedRobot.of(robot.changed(joints=[limited]), samples=1)
-        found = assembler(setting).at(bodies(setting, setting.everything.start), ())
+        setup = ObservedRobot.of(robot.changed(joints=[limited]), samples=1)
+        found = assembler(setup).at(bodies(setup, setup.all_samples.start), ())
         assert found.configuration is not None
         assert found.reachable is reachable
         assert found.beyond == (() if reachable else (limited.name,))
@@ -89,17 +89,17 @@ def test_limits_of_joints_are_kept():
 def test_limits_of_the_platforms_own_joints_are_kept(name: str):
     """A joint between the platform's bodies is on no leg; where its range does not hold the pose it is named, and no
     other value is possible, unless the pose is known too roughly for that."""
-    setting = ObservedRobot.of(load(shipped()[name]), samples=1)
-    legs = {joint for leg in setting.anatomy.legs for joint in leg.joints}
-    inside = [joint for joint in setting.mechanism.joints.values() if joint.name not in legs and joint.type in SINGLE]
+    setup = ObservedRobot.of(load(list_robots()[name]), samples=1)
+    legs = {joint for leg in setup.decomposition.legs for joint in leg.joints}
+    inside = [joint for joint in setup.mechanism.joints.values() if joint.name not in legs and joint.type in SINGLE]
     assert inside
     for upper, reachable in ((0.01, True), (-0.01, False)):
         limited = replace(inside[0], limits=Limits(lower=-0.2, upper=upper))
-        changed = ObservedRobot.of(setting.robot.changed(joints=[limited]), samples=1)
-        found = assembler(changed).at(bodies(changed, changed.everything.start), ())
+        changed = ObservedRobot.of(setup.robot.changed(joints=[limited]), samples=1)
+        found = assembler(changed).at(bodies(changed, changed.all_samples.start), ())
         assert found.reachable is reachable
         assert found.beyond == (() if reachable else (limited.name,))
-        rough = assembler(changed).at(bodies(changed, changed.everything.start), (), within=0.1)
+        rough = assembler(changed).at(bodies(changed, changed.all_samples.start), (), within=0.1)
         assert rough.reachable is (True if reachable else None)
 
 
@@ -136,7 +136,7 @@ def test_limits_of_joints_that_are_joined_are_said_to_be_left_out():
     robot, *_ = knuckles()
     bent = replace(robot.joints["s_ring"], limits=Limits(lower=-0.01, upper=0.01))
     free = hrsynth.modes(robot, ["1", "2", "3"])
-    assert free.to_dict()["unlimited"] == []
+    assert free.to_dict()["limits_ignored"] == []
     assert "as far as limits" not in str(free)
     asked = "x=0.3,y=0.1,z=1,rpy=0/0/0"
     for told in (
@@ -148,9 +148,9 @@ def test_limits_of_joints_that_are_joined_are_said_to_be_left_out():
         words = " ".join(str(told).split())
         assert "those of s_ring are not looked at" in words
         assert words.count("assembled there") == words.count("assembled there, as far as limits are looked at")
-        assert told.to_dict()["unlimited"] == ["s_ring"]
+        assert told.to_dict()["limits_ignored"] == ["s_ring"]
     run = hrsynth.servo(robot.changed(joints=[bent]), start="z=0.01", goal="z=0", time=0.1)
-    assert run.to_dict()["unlimited"] == ["s_ring"]
+    assert run.to_dict()["limits_ignored"] == ["s_ring"]
 
 
 @pytest.mark.slow
@@ -168,12 +168,14 @@ def test_limits_of_two_turns_that_are_one_joint_are_kept():
 
     for name, upper in (("b_0", 0.01), ("a_0", 0.5)):
         bent = robot.changed(joints=[replace(robot.joints[name], limits=Limits(lower=-0.01, upper=upper))])
-        setting = ObservedRobot.of(bent)
-        assert setting.unlimited == ()
-        assert Stops.of(setting.everything.twin, setting.everything.twin.q0).spans == {name: (-0.01, upper)}
+        setup = ObservedRobot.of(bent)
+        assert setup.limits_ignored == ()
+        assert CoordinateIntervals.of(setup.all_samples.model, setup.all_samples.model.q0).spans == {
+            name: (-0.01, upper)
+        }
         posed = hrsynth.check(bent, at="x=0.3,y=0.4,z=0.1,rpy=0/0/0").postures[0]
-        told = [(posed.configuration, posed.beyond)] + [
-            (mode.configuration, mode.beyond) for mode in hrsynth.modes(bent, ["2", "3", "4"]).modes
+        told = [(posed.configuration, posed.beyond_limits)] + [
+            (mode.configuration, mode.beyond_limits) for mode in hrsynth.modes(bent, ["2", "3", "4"]).modes
         ]
         for at, beyond in told:
             assert beyond == (() if -0.01 - 1e-7 <= turn(name, at) <= upper + 1e-7 else (name,))

@@ -9,10 +9,10 @@ import pytest
 
 from hrsynth.geometry.ranks import largest_angle
 from hrsynth.geometry.vectors import Array, unit
-from hrsynth.kinematics.certificate import Certificate, certify
 from hrsynth.kinematics.configuration import ClosedConfiguration
+from hrsynth.kinematics.equivalence import EquivalenceCheck, check_equivalence
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
-from hrsynth.kinematics.relation import relation
+from hrsynth.kinematics.velocity_relation import relation
 from hrsynth.mechanism.model import JointType, Mechanism, Motor
 from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.tolerances import FOLLOWED, RANK_GAP, SAME_RELATION
@@ -27,8 +27,8 @@ def hidden_of(robot: str, *legs: str) -> Mechanism:
     return hidden
 
 
-def judged(robot: str, hidden: Mechanism, *legs: str) -> Certificate:
-    return certify(derived(robot, legs or None).setting.samples, hidden, count=COUNT)
+def judged(robot: str, hidden: Mechanism, *legs: str) -> EquivalenceCheck:
+    return check_equivalence(derived(robot, legs or None).setup.samples, hidden, count=COUNT)
 
 
 def shifted(mechanism: Mechanism, joint: str, by: Array) -> Mechanism:
@@ -41,7 +41,7 @@ def virtual(mechanism: Mechanism) -> list[str]:
     return [name for name, joint in mechanism.joints.items() if joint.actuated]
 
 
-def caught(certificate: Certificate) -> bool:
+def caught(certificate: EquivalenceCheck) -> bool:
     """Whether the certificate refuses, with a reason and with evidence."""
     evidence = certificate.largest_angle > SAME_RELATION or certificate.residual > FOLLOWED
     return not certificate.passed and bool(certificate.reason) and evidence
@@ -79,12 +79,12 @@ def test_a_longer_rod_is_caught(robot: str, legs: tuple[str, ...]) -> None:
     """The end joint of one observed rod moves away by 1 % of the rod's length, along the rod and across it."""
     hidden = hidden_of(robot, *legs)
     derivation = derived(robot, legs or None)
-    observation = derivation.setting.observed[0]
+    observation = derivation.setup.observed[0]
     assert isinstance(observation, Direction)
     last = next(
         j
-        for j in hidden.joints_of(derivation.setting.anatomy.leg(observation.leg).attach)
-        if j.name in derivation.setting.anatomy.leg(observation.leg).joints
+        for j in hidden.joints_of(derivation.setup.decomposition.leg(observation.leg).platform_link)
+        if j.name in derivation.setup.decomposition.leg(observation.leg).joints
     )
     u = hidden.links[observation.link].pose[:3, :3] @ observation.direction
     side = unit(np.cross(u, [0, 0, 1]))
@@ -98,8 +98,8 @@ def test_a_longer_rod_is_caught(robot: str, legs: tuple[str, ...]) -> None:
 )
 def test_a_missing_leg_is_caught(robot: str, legs: tuple[str, ...]) -> None:
     hidden = hidden_of(robot, *legs)
-    anatomy = derived(robot, legs or None).setting.anatomy
-    leg = anatomy.leg(anatomy.labels[0])
+    decomposition = derived(robot, legs or None).setup.decomposition
+    leg = decomposition.leg(decomposition.labels[0])
     cut = hidden.changed(
         remove_links=[n for n in leg.links if n in hidden.links],
         remove_joints=[n for n in leg.joints if n in hidden.joints],
@@ -123,11 +123,12 @@ def exchanged(hidden: Mechanism, name: str) -> Mechanism:
 @pytest.mark.parametrize("robot", ["3upu", "3puu", "3ruu"])
 def test_exchanged_axes_of_a_universal_joint_are_caught(robot: str) -> None:
     """The two orders agree at the zero configuration, and it proves nothing."""
-    hidden, samples = hidden_of(robot), derived(robot).setting.samples
+    hidden, samples = hidden_of(robot), derived(robot).setup.samples
     wrong = exchanged(hidden, virtual(hidden)[0])
-    right_twin, wrong_twin = (PinocchioModel(each, samples.twin.length) for each in (hidden, wrong))
+    right_twin, wrong_twin = (PinocchioModel(each, samples.model.length) for each in (hidden, wrong))
     at_zero = [
-        relation(ClosedConfiguration.of(twin, twin.q0), samples.question).basis for twin in (right_twin, wrong_twin)
+        relation(ClosedConfiguration.of(model, model.q0), samples.observation_model).basis
+        for model in (right_twin, wrong_twin)
     ]
     assert largest_angle(*at_zero) < SAME_RELATION
     assert caught(judged(robot, wrong))
@@ -168,7 +169,7 @@ def test_a_motor_that_moves_something_unseen_is_caught() -> None:
 def test_a_blind_leg_that_moves_is_caught() -> None:
     """Where the observed link is not in the hidden robot its direction must be constant."""
     hidden = hidden_of("3rrr_m1")
-    leg = derived("3rrr_m1").setting.anatomy.leg("3")
+    leg = derived("3rrr_m1").setup.decomposition.leg("3")
     owned = {n for n in hidden.links if n in leg.links}
     cut = hidden.changed(remove_links=sorted(owned))
     cut = replace(cut, observations=tuple(o for o in cut.observations if o.link in cut.links))
@@ -181,9 +182,9 @@ def test_a_blind_leg_that_moves_is_caught() -> None:
 def test_further_bodies_count() -> None:
     """A hidden robot that keeps the platform may still move a link of the real robot in another way."""
     derivation = derived("quattro", ("1", "4"))
-    samples = derivation.setting.samples
+    samples = derivation.setup.samples
     assert derivation.hidden is not None
-    assert certify(samples, derivation.hidden, count=2, bodies=("plate_12", "plate_34")).passed
-    rods = certify(samples, derivation.hidden, count=2, bodies=("rod_1a",))
+    assert check_equivalence(samples, derivation.hidden, count=2, bodies=("plate_12", "plate_34")).passed
+    rods = check_equivalence(samples, derivation.hidden, count=2, bodies=("rod_1a",))
     assert not rods.passed
     assert "dim ρ" in rods.reason or "turns" in rods.reason

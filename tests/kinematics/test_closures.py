@@ -12,8 +12,8 @@ import hrsynth
 from hrsynth.analysis.modes.assembly_mode import AssemblyMode
 from hrsynth.geometry.vectors import inverse, rotation_about, unit
 from hrsynth.kinematics.assembly import ASSEMBLED, BEYOND, IMPOSSIBLE, NOT_FOUND, Assembler, Assembly
-from hrsynth.kinematics.closures import LegEnd, closures
-from hrsynth.kinematics.ways import Part
+from hrsynth.kinematics.leg_paths import MotionFactor
+from hrsynth.kinematics.leg_solutions import LegEnd, closures
 from hrsynth.mechanism import Joint, Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.legs import decompose
@@ -55,9 +55,9 @@ def displaced(mechanism: Mechanism, rng: np.random.Generator) -> np.ndarray:
 
 
 def assembled(mechanism: Mechanism, D: np.ndarray) -> Assembly:
-    anatomy = decompose(mechanism)
-    bodies = {leg.attach: D @ mechanism.links[leg.attach].pose for leg in anatomy.legs}
-    return Assembler(anatomy, mechanism.length, mechanism.reference).at(bodies, ())
+    decomposition = decompose(mechanism)
+    bodies = {leg.platform_link: D @ mechanism.links[leg.platform_link].pose for leg in decomposition.legs}
+    return Assembler(decomposition, mechanism.length, mechanism.reference).at(bodies, ())
 
 
 @pytest.mark.some(2, 6)
@@ -70,18 +70,18 @@ def test_what_is_said_of_assembly_holds_by_brute_force(kind: str, first: int, co
     for seed in range(first, first + count):
         rng = np.random.default_rng([KINDS.index(kind), seed])
         mechanism = robot(kind, rng)
-        anatomy, D = decompose(mechanism), displaced(mechanism, rng)
+        decomposition, D = decompose(mechanism), displaced(mechanism, rng)
         found = assembled(mechanism, D)
         words[found.verdict] += 1
         assert found.reachable is {ASSEMBLED: True, IMPOSSIBLE: False}[found.verdict]
         if found.configuration is not None:
-            attach = anatomy.legs[0].attach
-            assert closes(mechanism, found, D, attach, anatomy.point)
-        point = anatomy.point
+            attach = decomposition.legs[0].platform_link
+            assert closes(mechanism, found, D, attach, decomposition.point)
+        point = decomposition.point
         if point is not None:
             point = (mechanism.links[mechanism.platform].pose @ np.append(point, 1.0))[:3]
         for label, why in found.misses[:1]:
-            left = miss(mechanism, anatomy.leg(label), D, point, rng, starts=4 if count < 3 else 12)
+            left = miss(mechanism, decomposition.leg(label), D, point, rng, starts=4 if count < 3 else 12)
             assert left > 1e-8, why
             assert why.by > 0
     assert words[ASSEMBLED] or kind == "RPS" or count < 3
@@ -120,7 +120,7 @@ def _at(D: np.ndarray, x: np.ndarray) -> np.ndarray:
     return np.asarray(D[:3, :3] @ x + D[:3, 3])
 
 
-def shifted(part: Part, q: float) -> np.ndarray:
+def shifted(part: MotionFactor, q: float) -> np.ndarray:
     """The displacement (4, 4) by a part with the value q."""
     D = np.eye(4)
     if part.slides:
@@ -140,9 +140,9 @@ def test_values_that_close_a_skew_leg_are_among_those_told(first: str, second: s
     for seed in range(20):
         rng = np.random.default_rng(seed)
 
-        def part(kind: str, rng: np.random.Generator = rng) -> Part:
+        def part(kind: str, rng: np.random.Generator = rng) -> MotionFactor:
             axis = None if kind == "S" else random_direction(rng)
-            return Part(kind == "P", rng.normal(size=3), axis, (f"joint_{rng.integers(1 << 30)}",))
+            return MotionFactor(kind == "P", rng.normal(size=3), axis, (f"joint_{rng.integers(1 << 30)}",))
 
         way = [part(first), part(second), part(last)]
         q = [rng.uniform(-0.5, 0.5) if each.slides else rng.uniform(-np.pi, np.pi) for each in way]
@@ -262,5 +262,5 @@ def test_beyond_limits_names_the_joints_of_the_closure_that_was_found() -> None:
 
 
 def words_of(found: Assembly) -> str:
-    mode = AssemblyMode(Pose(), 0.0, 0.0, 0.0, False, found.reachable, None, found.verdict, beyond=found.beyond)
+    mode = AssemblyMode(Pose(), 0.0, 0.0, 0.0, False, found.reachable, None, found.verdict, beyond_limits=found.beyond)
     return " ".join(assembly(mode))

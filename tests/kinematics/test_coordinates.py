@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.batch.reach import reach
+from hrsynth.batch.pose_continuation import reach
 from hrsynth.description import load
 from hrsynth.geometry.vectors import rotation_from_rpy
+from hrsynth.kinematics.continuation import track
 from hrsynth.kinematics.coordinates import Coordinates
-from hrsynth.kinematics.steps import track
 from oracle import exponential
 from strategies import planar, transformed
 
@@ -27,32 +27,32 @@ EXPECTED = {
 
 
 def made(name: str) -> tuple[Coordinates, ObservedRobot]:
-    setting = ObservedRobot.of(load(name))
-    start = setting.everything.start
-    return Coordinates.of(start, setting.everything.question, setting.motion), setting
+    setup = ObservedRobot.of(load(name))
+    start = setup.all_samples.start
+    return Coordinates.of(start, setup.all_samples.observation_model, setup.motion), setup
 
 
 @pytest.mark.parametrize("name", EXPECTED)
 def test_a_platform_has_as_many_coordinates_as_freedoms(name: str):
-    coordinates, setting = made(name)
+    coordinates, setup = made(name)
     assert coordinates.names == EXPECTED[name]
-    assert len(coordinates.names) == setting.dof
+    assert len(coordinates.names) == setup.dof
 
 
 @pytest.mark.parametrize(("name", "index"), [("3rrr_m1", 0), ("delta", 2), ("quattro", 2)])
 def test_from_the_edge_of_the_reach_a_coordinate_goes_back(name: str, index: int):
     """All steps of its way, though at a stretched leg only the smallest ones find it."""
-    coordinates, setting = made(name)
-    start, far = setting.everything.start, coordinates.values.copy()
-    far[index] += 5 * start.twin.length
-    edge, came = track(start, setting.motion, replace(coordinates, values=far))
+    coordinates, setup = made(name)
+    start, far = setup.all_samples.start, coordinates.values.copy()
+    far[index] += 5 * start.model.length
+    edge, came = track(start, setup.motion, replace(coordinates, values=far))
     assert came < 1
-    here = Coordinates.of(edge, setting.everything.question, setting.motion)
+    here = Coordinates.of(edge, setup.all_samples.observation_model, setup.motion)
     index = here.places.index(coordinates.places[index])
-    way = here.along(edge, index, (0.1 * start.twin.length, 0.0), 4)
+    way = here.along(edge, index, (0.1 * start.model.length, 0.0), 4)
     assert len(way) == 5
     assert [value for value, _ in way] == pytest.approx(
-        here.values[index] - np.linspace(0.1, 0, 5) * start.twin.length, abs=1e-9
+        here.values[index] - np.linspace(0.1, 0, 5) * start.model.length, abs=1e-9
     )
 
 
@@ -60,22 +60,22 @@ def test_from_the_edge_of_the_reach_a_coordinate_goes_back(name: str, index: int
 @pytest.mark.parametrize("seed", range(4))
 def test_the_turn_of_a_planar_robot_is_its_angle_about_the_normal(seed: int):
     """Wherever its plane lies: no component of the turn, which is less."""
-    setting = ObservedRobot.of(planar(["RRR", "RPR", "RPR"], np.random.default_rng(seed), [{0}, {1}, {1}]), samples=3)
-    start, motion = setting.everything.start, setting.motion
-    coordinates = Coordinates.of(start, setting.everything.question, motion)
+    setup = ObservedRobot.of(planar(["RRR", "RPR", "RPR"], np.random.default_rng(seed), [{0}, {1}, {1}]), samples=3)
+    start, motion = setup.all_samples.start, setup.motion
+    coordinates = Coordinates.of(start, setup.all_samples.observation_model, motion)
     assert coordinates.names[2] == "phi"
     for value, at in coordinates.along(start, 2, (0.3, 0.3), 3):
         turn = at.pose(motion.link)[:3, :3] @ motion.home[:3, :3].T
         assert turn == pytest.approx(exponential(value * motion.normal), abs=1e-8)
-        assert reach(start, setting.everything.question, motion.pose(at.pose(motion.link)), motion) is not None
+        assert reach(start, setup.all_samples.observation_model, motion.pose(at.pose(motion.link)), motion) is not None
 
 
 def test_the_turn_about_a_tilted_axis_is_its_angle():
     """A robot that turns about one axis in space, which is not the base's z."""
     R = rotation_from_rpy(0.5, 0.3, 0.2)
-    setting = ObservedRobot.of(transformed(load("quattro"), R, np.zeros(3)), samples=3)
-    start, motion = setting.everything.start, setting.motion
-    coordinates = Coordinates.of(start, setting.everything.question, motion)
+    setup = ObservedRobot.of(transformed(load("quattro"), R, np.zeros(3)), samples=3)
+    start, motion = setup.all_samples.start, setup.motion
+    coordinates = Coordinates.of(start, setup.all_samples.observation_model, motion)
     assert coordinates.names[3] == "turn about " + " ".join(f"{x:.3g}" for x in R[:, 2])
     for value, at in coordinates.along(start, 3, (0.3, 0.3), 3):
         turn = at.pose(motion.link)[:3, :3] @ motion.home[:3, :3].T
@@ -83,28 +83,29 @@ def test_the_turn_about_a_tilted_axis_is_its_angle():
 
 
 def test_an_angle_is_the_same_after_a_whole_turn():
-    coordinates, setting = made("3rrr_m1")
-    X = setting.everything.start.pose(setting.motion.link)
+    coordinates, setup = made("3rrr_m1")
+    X = setup.all_samples.start.pose(setup.motion.link)
     turned = replace(coordinates, values=coordinates.values + [0, 0, 2 * np.pi])
     assert turned.apart(X) == pytest.approx(np.zeros(3), abs=1e-12)
 
 
 @pytest.mark.parametrize("name", ["quattro", "gough_stewart", "3rps", "3rrr_m1"])
 def test_the_jacobian_is_that_of_the_error(name: str):
-    coordinates, setting = made(name)
+    coordinates, setup = made(name)
     step = 1e-6
-    for at in setting.configurations[:3]:
-        rows = coordinates.rows(at.twin, at.q)[1]
-        for k, direction in enumerate(np.eye(at.twin.nv)):
+    for at in setup.configurations[:3]:
+        rows = coordinates.error_and_jacobian(at.model, at.q)[1]
+        for k, direction in enumerate(np.eye(at.model.nv)):
             ahead, behind = (
-                coordinates.rows(at.twin, at.twin.integrate(at.q, s * direction))[0] for s in (step, -step)
+                coordinates.error_and_jacobian(at.model, at.model.integrate(at.q, s * direction))[0]
+                for s in (step, -step)
             )
             assert rows[:, k] == pytest.approx((ahead - behind) / (2 * step), abs=1e-7)
 
 
 def test_half_the_way_has_half_the_coordinates():
-    coordinates, setting = made("gough_stewart")
-    X = setting.configurations[0].pose(setting.motion.link)
+    coordinates, setup = made("gough_stewart")
+    X = setup.configurations[0].pose(setup.motion.link)
     half = coordinates.towards(X, 0.5)
     assert half.values == pytest.approx((coordinates.read(X) + coordinates.values) / 2)
     assert coordinates.towards(X, 1.0).values == pytest.approx(coordinates.values)
@@ -112,8 +113,8 @@ def test_half_the_way_has_half_the_coordinates():
 
 @pytest.mark.parametrize("name", ["rrrrr_m1", "3rps"])
 def test_one_coordinate_changes_in_equal_steps_and_the_others_stay(name: str):
-    coordinates, setting = made(name)
-    start = setting.everything.start
+    coordinates, setup = made(name)
+    start = setup.all_samples.start
     for index, place in enumerate(coordinates.places):
         way = coordinates.along(start, index, (0.05, 0.1), 4)
         values = np.array([value for value, _ in way])
@@ -123,4 +124,4 @@ def test_one_coordinate_changes_in_equal_steps_and_the_others_stay(name: str):
         for value, at in way:
             wanted = coordinates.values.copy()
             wanted[index] = value
-            assert coordinates.read(at.pose(setting.motion.link)) == pytest.approx(wanted, abs=1e-8), place
+            assert coordinates.read(at.pose(setup.motion.link)) == pytest.approx(wanted, abs=1e-8), place

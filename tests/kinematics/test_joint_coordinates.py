@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import hrsynth
-from hrsynth.analysis.asked import asked_at
 from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.analysis.pose_requests import asked_at
 from hrsynth.cli import execute
 from hrsynth.errors import BadRequest, PoseNotReached
 from hrsynth.geometry.vectors import Array
@@ -28,26 +28,26 @@ PIECES = 300
 
 def along_line(start: ClosedConfiguration, names: list[str], wanted: dict[str, tuple[float, ...]]) -> Array:
     """Where plain Newton steps of least norm lead, on a straight line of the coordinates in many pieces."""
-    twin = start.twin
-    places = [i for name in names for i in twin.coordinates[name]]
-    units = [twin.length if twin.mechanism.joints[name].type.slides else 1.0 for name in names]
+    model = start.model
+    places = [i for name in names for i in model.coordinates[name]]
+    units = [model.length if model.mechanism.joints[name].type.slides else 1.0 for name in names]
     goal = np.concatenate([np.array(wanted[name]) / unit for name, unit in zip(names, units, strict=True)])
-    begun, q = twin.difference(twin.q0, start.q)[places], start.q
+    begun, q = model.difference(model.q0, start.q)[places], start.q
     for k in range(1, PIECES + 1):
         aim = begun + (goal - begun) * k / PIECES
         for _ in range(8):
-            error = np.concatenate([twin.residual(q), twin.difference(twin.q0, q)[places] - aim])
+            error = np.concatenate([model.residual(q), model.difference(model.q0, q)[places] - aim])
             if np.linalg.norm(error) < 1e-11:
                 break
-            J = np.vstack([twin.jacobian(q), np.eye(twin.nv)[places]])
-            q = twin.integrate(q, np.asarray(-np.linalg.lstsq(J, error, rcond=1e-9)[0]))
+            J = np.vstack([model.jacobian(q), np.eye(model.nv)[places]])
+            q = model.integrate(q, np.asarray(-np.linalg.lstsq(J, error, rcond=1e-9)[0]))
     return np.asarray(q)
 
 
 def determine(start: ClosedConfiguration, names: list[str], link: str) -> bool:
     """Whether these joints at rest hold the platform at rest."""
     T = start.kernel()[0]
-    rows = np.eye(start.twin.nv)[[i for name in names for i in start.twin.coordinates[name]]] @ T
+    rows = np.eye(start.model.nv)[[i for name in names for i in start.model.coordinates[name]]] @ T
     both = np.vstack([rows, start.velocity(link) @ T])
     return bool(np.linalg.matrix_rank(rows, 1e-6) == np.linalg.matrix_rank(both, 1e-6))
 
@@ -57,14 +57,14 @@ def determine(start: ClosedConfiguration, names: list[str], link: str) -> bool:
 @pytest.mark.parametrize("name", ROBOTS)
 def test_a_configuration_is_found_again_by_its_joints(name: str, motors: bool) -> None:
     """Where the line leads elsewhere, an independent way along it leads there too."""
-    setting = ObservedRobot.of(name)
-    start, link = setting.everything.start, setting.motion.link
-    names = [joint.name for joint in counted_joints(setting.robot) if joint.actuated == motors]
-    if not names or not all(name in start.twin.coordinates for name in names) or not determine(start, names, link):
+    setup = ObservedRobot.of(name)
+    start, link = setup.all_samples.start, setup.motion.link
+    names = [joint.name for joint in counted_joints(setup.robot) if joint.actuated == motors]
+    if not names or not all(name in start.model.coordinates for name in names) or not determine(start, names, link):
         pytest.skip("these joints do not say where the platform is")
     for at in random_walk(start, 8, seed=3):
         wanted = {name: read_joints(at)[name] for name in names}
-        (found,) = asked_at(setting, [JointPose(motors, tuple(wanted.items()))])
+        (found,) = asked_at(setup, [JointPose(motors, tuple(wanted.items()))])
         if isinstance(found, PoseNotReached):
             assert found.reason.startswith(("a singularity lies ahead", "with the others as they are"))
             continue
@@ -72,17 +72,17 @@ def test_a_configuration_is_found_again_by_its_joints(name: str, motors: bool) -
         assert max(np.abs(np.subtract(told[name], wanted[name])).max() for name in names) < 1e-6
         if np.abs(found.pose(link) - at.pose(link)).max() > 1e-5:
             q = along_line(start, names, wanted)
-            assert np.abs(found.pose(link) - start.twin.pose(q, link)).max() < 1e-5
+            assert np.abs(found.pose(link) - start.model.pose(q, link)).max() < 1e-5
 
 
 def test_coordinates_count_as_the_file_counts() -> None:
     """After the zero configuration has moved the same pose has the same coordinates."""
     moved = hrsynth.observe("delta", at="motors:0.1,0.2,0.3")
-    told = FileCoordinates.of(moved.everything.start)
+    told = FileCoordinates.of(moved.all_samples.start)
     assert told.motors == pytest.approx({"shoulder_1": 0.1, "shoulder_2": 0.2, "shoulder_3": 0.3}, abs=1e-9)
     (back,) = asked_at(moved, [asked_pose("motors:0,0,0")])
     assert isinstance(back, ClosedConfiguration)
-    zero = ObservedRobot.of("delta").everything.start
+    zero = ObservedRobot.of("delta").all_samples.start
     link = moved.motion.link
     assert np.abs(back.pose(link) - zero.pose(link)).max() < 1e-8
 
@@ -92,14 +92,14 @@ def test_the_file_counts_on_where_its_joints_were_joined_and_its_zero_has_moved(
     for seed in range(2):
         robot = split(robot, np.random.default_rng(seed), ("spherical",))
     moved = hrsynth.observe(robot, at="motors:0.1,0.2,0.3")
-    told = FileCoordinates.of(moved.everything.start)
+    told = FileCoordinates.of(moved.all_samples.start)
     assert {*told.joints} == {joint.name for joint in counted_joints(robot) if not joint.actuated} != set()
     assert told.motors == pytest.approx({"shoulder_1": 0.1, "shoulder_2": 0.2, "shoulder_3": 0.3}, abs=1e-9)
     same = asked_at(moved, [JointPose(False, tuple((name, (value,)) for name, value in told.joints.items()))])
     assert isinstance(same[0], ClosedConfiguration)
     (back,) = asked_at(moved, [asked_pose("motors:0,0,0")])
     assert isinstance(back, ClosedConfiguration)
-    zero, link = ObservedRobot.of(robot).everything.start, moved.motion.link
+    zero, link = ObservedRobot.of(robot).all_samples.start, moved.motion.link
     assert np.abs(back.pose(link) - zero.pose(link)).max() < 1e-8
     found = hrsynth.check(moved, at="motors:shoulder_2=0").postures[0].coordinates
     assert found.motors == pytest.approx({"shoulder_1": 0.1, "shoulder_2": 0.0, "shoulder_3": 0.3}, abs=1e-9)
@@ -182,7 +182,7 @@ def test_coordinates_that_contradict_each_other_are_refused() -> None:
         hrsynth.check("3rrr_m1", at="joints:shoulder_1=0.1,shoulder_2=0,shoulder_3=0,elbow_1=0.4")
 
 
-@pytest.mark.parametrize("command", ["check", "modes", "accuracy", pytest.param("endings", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("command", ["check", "modes", "accuracy", pytest.param("equilibria", marks=pytest.mark.slow)])
 def test_each_command_takes_them_and_tells_them(command: str, capsys) -> None:
     more = ["--cone", "0.1deg"] * (command == "accuracy")
     assert execute([command, "3rrr_m1", "--at", "motors:0.05,0,0", "--json", *more]) == 0
@@ -195,10 +195,10 @@ def test_each_command_takes_them_and_tells_them(command: str, capsys) -> None:
 
 def test_joints_that_the_normal_form_has_joined_are_told() -> None:
     """The passive hinges of a U, and of a ball written as three R, have the coordinates that their file has."""
-    setting = ObservedRobot.of("3upu")
-    (at,) = asked_at(setting, [asked_pose("motors:0.02,-0.01,0.03")])
+    setup = ObservedRobot.of("3upu")
+    (at,) = asked_at(setup, [asked_pose("motors:0.02,-0.01,0.03")])
     assert isinstance(at, ClosedConfiguration)
-    robot = setting.robot
+    robot = setup.robot
     assert {*read_joints(at)} == {joint.name for joint in counted_joints(robot)}
 
 

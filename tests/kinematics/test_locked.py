@@ -12,8 +12,8 @@ from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.geometry.ranks import kernel_basis, range_basis
 from hrsynth.geometry.vectors import Array, hat, unit
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.locked import interaction, leg_twists, split
-from hrsynth.kinematics.relation import Measurement, relation
+from hrsynth.kinematics.locked_twists import interaction, leg_twists, split
+from hrsynth.kinematics.velocity_relation import ObservationModel, relation
 from hrsynth.kinematics.walking import WEAKEST, random_walk
 from hrsynth.mechanism.legs import Leg
 from hrsynth.mechanism.observations.direction import Direction
@@ -22,9 +22,9 @@ from kinematics.robots import ROBOTS, setting_of, state_of
 from oracle import Oracle, Rows, rows_of
 
 
-def by_pinocchio(at: ClosedConfiguration, question: Measurement) -> Array:
+def by_pinocchio(at: ClosedConfiguration, observation_model: ObservationModel) -> Array:
     """Singular values of Mᵀ from the relation: the pairs (t, u̇) solved for u̇, what moves with t = 0 left out."""
-    found = relation(at, question)
+    found = relation(at, observation_model)
     still, _ = kernel_basis(found.twist_part, 1.0)
     hidden, _ = range_basis(found.rates @ still, 1.0)
     M = found.rates @ np.linalg.pinv(found.twist_part, rcond=1e-9) @ found.twists
@@ -37,23 +37,23 @@ def by_pinocchio(at: ClosedConfiguration, question: Measurement) -> Array:
 def test_the_interaction_matrix_is_that_of_the_engine(robot: str, carried: bool) -> None:
     platform = setting_of(robot).mechanism.platform
     samples = setting_of(robot, None, platform if carried else None).samples
-    assert samples.question.reference == (platform if carried else setting_of(robot).mechanism.base)
+    assert samples.observation_model.reference == (platform if carried else setting_of(robot).mechanism.base)
     for member in samples.members:
-        M = interaction(member.configuration, samples.question)
-        assert M.shape == (sum(samples.question.sizes), member.relation.dof.value)
-        wanted = by_pinocchio(member.configuration, samples.question)
+        M = interaction(member.configuration, samples.observation_model)
+        assert M.shape == (sum(samples.observation_model.sizes), member.relation.dof.value)
+        wanted = by_pinocchio(member.configuration, samples.observation_model)
         np.testing.assert_allclose(np.linalg.svd(M, compute_uv=False), wanted, atol=1e-8)
 
 
 def by_oracle(at: ClosedConfiguration, leg: Leg, locks: list[Direction]) -> Array:
     """A basis of the leg's twists in maximal coordinates: its joints' constraints alone, directions held."""
-    mechanism, oracle = at.twin.mechanism, Oracle(at.twin.mechanism)
-    state, rows = state_of(at.twin, at.q), Rows()
+    mechanism, oracle = at.model.mechanism, Oracle(at.model.mechanism)
+    state, rows = state_of(at.model, at.q), Rows()
     for name in leg.joints:
         joint = mechanism.joints[name]
         i, j = (oracle.index[link] for link in joint.links)
         rows += rows_of(joint, i, j, mechanism.links[joint.predecessor].pose, mechanism.links[joint.successor].pose)
-    links = [link for link in dict.fromkeys((*leg.links, leg.attach)) if link != mechanism.base]
+    links = [link for link in dict.fromkeys((*leg.links, leg.platform_link)) if link != mechanism.base]
     numbers = [oracle.index[link] for link in links]
     J = rows.evaluate(state)[1][:, numbers].reshape(len(rows), 6 * len(numbers))
     held = [J]
@@ -62,11 +62,11 @@ def by_oracle(at: ClosedConfiguration, leg: Leg, locks: list[Direction]) -> Arra
         start = 6 * links.index(lock.link)
         block[:, start + 3 : start + 6] = hat(at.pose(lock.link)[:3, :3] @ lock.direction)
         held.append(block)
-    units = np.tile([at.twin.length] * 3 + [1.0] * 3, len(links))
+    units = np.tile([at.model.length] * 3 + [1.0] * 3, len(links))
     _, values, right = np.linalg.svd(np.vstack(held) * units)
     kernel = right[int(np.sum(values > 1e-9 * values[0])) :].T
-    end = kernel[6 * links.index(leg.attach) :][:6].copy()
-    end[:3] += hat(at.pose(leg.attach)[:3, 3] / at.twin.length) @ end[3:]
+    end = kernel[6 * links.index(leg.platform_link) :][:6].copy()
+    end[:3] += hat(at.pose(leg.platform_link)[:3, 3] / at.model.length) @ end[3:]
     U, sizes, _ = np.linalg.svd(end)
     return np.asarray(U[:, : int(np.sum(sizes > 1e-8))])
 
@@ -89,24 +89,24 @@ def by_oracle(at: ClosedConfiguration, leg: Leg, locks: list[Direction]) -> Arra
     ],
 )
 def test_a_held_leg_allows_what_the_oracle_says(robot: str) -> None:
-    setting = setting_of(robot)
-    samples = setting.samples
+    setup = setting_of(robot)
+    samples = setup.samples
     for member in samples.members:
-        for leg in setting.anatomy.legs:
+        for leg in setup.decomposition.legs:
             for held in (True, False):
-                locks = [o for o in samples.question.observations if held and o.leg == leg.label]
-                T = leg_twists(member.configuration, leg, locks, samples.question.reference)
+                locks = [o for o in samples.observation_model.observations if held and o.leg == leg.label]
+                T = leg_twists(member.configuration, leg, locks, samples.observation_model.reference)
                 wanted = by_oracle(member.configuration, leg, locks)
                 assert T.shape == wanted.shape
                 assert np.linalg.norm(T - wanted @ (wanted.T @ T)) < 1e-7
 
 
 def test_what_is_seen_from_outside_a_leg_cannot_be_held_in_it() -> None:
-    setting = setting_of("delta")
-    leg, (at, *_) = setting.anatomy.legs[0], [member.configuration for member in setting.samples.members]
-    locks = [setting.samples.question.observations[0]]
-    with pytest.raises(ValueError, match=setting.anatomy.legs[1].links[0]):
-        leg_twists(at, leg, locks, setting.anatomy.legs[1].links[0])
+    setup = setting_of("delta")
+    leg, (at, *_) = setup.decomposition.legs[0], [member.configuration for member in setup.samples.members]
+    locks = [setup.samples.observation_model.observations[0]]
+    with pytest.raises(ValueError, match=setup.decomposition.legs[1].links[0]):
+        leg_twists(at, leg, locks, setup.decomposition.legs[1].links[0])
 
 
 def system(point: Array, translations: list[Array], rotations: list[Array], screws: list[Array]) -> Array:
@@ -144,17 +144,17 @@ def test_wander(robot: str) -> None:
     samples = setting_of(robot).samples
     met = list(random_walk(samples.start, 30, seed=3))
     assert len(met) == 30
-    twin, generic = samples.twin, samples.mobility
+    model, generic = samples.model, samples.mobility
     weakest = WEAKEST * samples.start.kernel()[1].weakest
     for at in met:
         assert at.residual <= CLOSED
         assert at.kernel()[0].shape[1] == generic
         assert at.kernel()[1].weakest >= weakest
-    steps = [np.linalg.norm(twin.difference(a.q, b.q)) for a, b in pairwise([samples.start, *met])]
+    steps = [np.linalg.norm(model.difference(a.q, b.q)) for a, b in pairwise([samples.start, *met])]
     assert min(steps) > 1e-3
     assert np.median(steps) < 0.5
-    platform = [at.pose(twin.mechanism.platform) for at in met]
-    assert max(np.linalg.norm(X - samples.start.pose(twin.mechanism.platform)) for X in platform) > 0.1 * twin.length
+    platform = [at.pose(model.mechanism.platform) for at in met]
+    assert max(np.linalg.norm(X - samples.start.pose(model.mechanism.platform)) for X in platform) > 0.1 * model.length
     again = [at.q for at in random_walk(samples.start, 30, seed=3)]
     assert all(np.array_equal(a.q, q) for a, q in zip(met, again, strict=True))
     assert not np.array_equal(met[0].q, next(random_walk(samples.start, 1, seed=4)).q)
@@ -163,8 +163,10 @@ def test_wander(robot: str) -> None:
 @pytest.mark.parametrize(("ratio", "seed"), [(2.0, 3), (-1.5, 1), (0.5, 2)])
 def test_gears_are_among_the_screws(ratio: float, seed: int) -> None:
     """What is observed of a geared five-bar sees as much by the screws of all joints as by the engine's Jacobians."""
-    setting = ObservedRobot.of(five_bar(ratio, seed)[0])
-    for at in setting.configurations[:5]:
-        seen = by_pinocchio(at, setting.samples.question)
-        assert np.allclose(np.linalg.svd(interaction(at, setting.samples.question), compute_uv=False), seen, atol=1e-9)
+    setup = ObservedRobot.of(five_bar(ratio, seed)[0])
+    for at in setup.configurations[:5]:
+        seen = by_pinocchio(at, setup.samples.observation_model)
+        assert np.allclose(
+            np.linalg.svd(interaction(at, setup.samples.observation_model), compute_uv=False), seen, atol=1e-9
+        )
         assert seen[-1] > 1e-3

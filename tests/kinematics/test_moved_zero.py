@@ -11,13 +11,13 @@ import pytest
 
 import hrsynth
 from description.foreign.rounded import of_hinges
-from hrsynth.description import shipped
+from hrsynth.description import list_robots
 from hrsynth.description.assembly.loops import SINGLE, LoopAssembly
-from hrsynth.description.assembly.zero import at_file_zero, with_zero_at, zeroed_at
+from hrsynth.description.assembly.zero_configuration import at_file_zero, with_zero_at, zeroed_at
 from hrsynth.kinematics import limits
 from hrsynth.kinematics.assembly import of_links
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.locked import rezero
+from hrsynth.kinematics.locked_twists import rezero
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.model import Limits
@@ -37,12 +37,12 @@ def limited(robot: Mechanism, seed: int = 0) -> Mechanism:
     )
 
 
-def margins(twin: PinocchioModel, at: ClosedConfiguration) -> dict[str, tuple[float, float]]:
+def margins(model: PinocchioModel, at: ClosedConfiguration) -> dict[str, tuple[float, float]]:
     """How far each coordinate is from its two limits, turns within one."""
     found = {}
-    for name, value in limits.coordinates(twin, at.q).items():
-        joint, _, lower, upper = twin.mechanism.stops[name]
-        whole = np.inf if twin.mechanism.joints[joint].type.slides else 2 * np.pi
+    for name, value in limits.coordinates(model, at.q).items():
+        joint, _, lower, upper = model.mechanism.stops[name]
+        whole = np.inf if model.mechanism.joints[joint].type.slides else 2 * np.pi
         found[name] = tuple(
             float(np.angle(np.exp(1j * x))) if np.isfinite(whole) else x for x in (value - lower, upper - value)
         )
@@ -50,34 +50,34 @@ def margins(twin: PinocchioModel, at: ClosedConfiguration) -> dict[str, tuple[fl
 
 
 @pytest.mark.some(4, 12)
-@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("name", list_robots())
 def test_limits_and_wrists_move_with_the_zero(name: str):
     """Of balls and U joints as three and two R, in normal form, where these limit what is one joint."""
     robot = normal_form(limited(of_hinges(hrsynth.load(name)))).mechanism
-    twin = PinocchioModel(robot)
-    home = walked(twin, seed=1)
+    model = PinocchioModel(robot)
+    home = walked(model, seed=1)
     moved = rezero(home)
-    other = PinocchioModel(moved, twin.length)
+    other = PinocchioModel(moved, model.length)
     for seed in (1, 2, 3):
-        there = walked(twin, seed=seed, steps=2)
+        there = walked(model, seed=seed, steps=2)
         same = of_links(other, there.pose)
-        assert limits.outside(twin, there.q) == limits.outside(other, same.q)
-        assert limits.wrist_margins(twin, there.q) == pytest.approx(limits.wrist_margins(other, same.q), abs=1e-8)
-        before, after = margins(twin, there), margins(other, same)
+        assert limits.outside(model, there.q) == limits.outside(other, same.q)
+        assert limits.wrist_margins(model, there.q) == pytest.approx(limits.wrist_margins(other, same.q), abs=1e-8)
+        before, after = margins(model, there), margins(other, same)
         assert before.keys() == after.keys()
         for each, value in before.items():
             assert value == pytest.approx(after[each], abs=1e-8)
 
 
 @pytest.mark.some(6, 12)
-@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("name", list_robots())
 def test_what_the_file_counts_is_remembered(name: str):
     """By one move, by two, and back to the file's zero; by link poses, and by the values of a tree."""
     robot = limited(hrsynth.load(name))
-    twin = PinocchioModel(robot)
-    first, second = (walked(twin, seed=seed) for seed in (1, 2))
+    model = PinocchioModel(robot)
+    first, second = (walked(model, seed=seed) for seed in (1, 2))
     once = rezero(first)
-    twice = rezero(of_links(PinocchioModel(once, twin.length), second.pose))
+    twice = rezero(of_links(PinocchioModel(once, model.length), second.pose))
     values = LoopAssembly.of(twice).zero()
     for moved in (
         once,
@@ -85,15 +85,15 @@ def test_what_the_file_counts_is_remembered(name: str):
         with_zero_at(twice, LoopAssembly.of(twice), values),
         zeroed_at(once, {link: second.pose(link) for link in robot.links}),
     ):
-        assert moved.filed.keys() == robot.filed.keys() == robot.limited.keys()
-        for joint, ends in robot.limited.items():
+        assert moved.filed.keys() == robot.filed.keys() == robot.joint_ranges.keys()
+        for joint, ends in robot.joint_ranges.items():
             assert moved.filed[joint] == pytest.approx(ends, abs=1e-9)
         back = at_file_zero(moved)
         assert back is not None
         for link in robot.links:
             np.testing.assert_allclose(back.links[link].pose, robot.links[link].pose, atol=1e-8)
-        for joint, ends in robot.limited.items():
-            assert back.limited[joint] == pytest.approx(ends, abs=1e-8)
+        for joint, ends in robot.joint_ranges.items():
+            assert back.joint_ranges[joint] == pytest.approx(ends, abs=1e-8)
 
 
 POSES = {
@@ -124,8 +124,8 @@ def test_answers_are_those_of_the_same_robot(name: str):
     assert numbers(one["characteristic_length"]) == numbers(two["characteristic_length"])
     assert numbers(at) == pytest.approx(numbers(zero), rel=1e-5, abs=1e-6)
     found, again = hrsynth.modes(robot, at=pose), hrsynth.modes(moved)
-    assert [(mode.beyond, mode.reachable) for mode in found.modes] == [
-        (mode.beyond, mode.reachable) for mode in again.modes
+    assert [(mode.beyond_limits, mode.reachable) for mode in found.modes] == [
+        (mode.beyond_limits, mode.reachable) for mode in again.modes
     ]
     for mode, other in zip(found.modes, again.modes, strict=True):
         assert numbers(mode.to_dict()["pose"]) == pytest.approx(numbers(other.to_dict()["pose"]), abs=1e-6)
@@ -142,5 +142,5 @@ def test_the_ranges_of_motors_are_those_of_the_same_robot(name: str, tmp_path: P
     one, two = hrsynth.branch(robot, effort=60), hrsynth.branch(moved, effort=60)
     for part, other in zip(one.parts, two.parts, strict=True):
         assert part.motors == other.motors
-        np.testing.assert_allclose(part.asked, other.asked, atol=1e-9)
+        np.testing.assert_allclose(part.requested_box, other.requested_box, atol=1e-9)
         assert np.abs(other.q0).max() > 1e-3

@@ -17,7 +17,7 @@ from hrsynth.description.contents import Inertial, content_of, fragments
 from hrsynth.geometry.so3 import logarithm
 from hrsynth.geometry.vectors import Array, pose
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.locked import rezero
+from hrsynth.kinematics.locked_twists import rezero
 from hrsynth.kinematics.pinocchio_export import PinocchioExport
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.kinematics.walking import random_walk
@@ -99,8 +99,8 @@ def apart(X: dict[str, Array], poses: dict[str, Array]) -> list[Array]:
 
 def check_closed(robot: Mechanism, steps: int = 4) -> None:
     """The zero configuration and some others, on a walk from there, are those of the twin."""
-    twin, pinned = PinocchioModel(robot), Pinned(robot.to_pinocchio())
-    start, q = ClosedConfiguration.of(twin, twin.q0), pinned.export.q0
+    model, pinned = PinocchioModel(robot), Pinned(robot.to_pinocchio())
+    start, q = ClosedConfiguration.of(model, model.q0), pinned.export.q0
     assert set(pinned.links) == set(robot.links)
     assert pinned.export.closures == tuple(each.name for each in pinned.export.constraint_models)
     for at in (start, *random_walk(start, steps, steps=steps)):
@@ -132,14 +132,14 @@ def test_coordinates_are_those_of_the_file(name: str):
     """Joints by joints of the tree that Pinocchio reads: placements, names, sense; balls at rest, which a file says as
     three joints."""
     robot = robot_named(name)
-    export, theirs = robot.to_pinocchio(), pin.buildModelFromUrdf(str(hrsynth.shipped().get(name, MODELS / name)))
+    export, theirs = robot.to_pinocchio(), pin.buildModelFromUrdf(str(hrsynth.list_robots().get(name, MODELS / name)))
     rng, q, their_q = np.random.default_rng(0), export.q0.copy(), pin.neutral(theirs)
     for joint in export.model.joints[1:]:
         if joint.nq == 1 and theirs.existJointName(export.model.names[joint.id]):
             value = rng.uniform(-2, 2)
             q[joint.idx_q] = value
-            twin = theirs.joints[theirs.getJointId(export.model.names[joint.id])]
-            their_q[twin.idx_q : twin.idx_q + twin.nq] = value if twin.nq == 1 else [np.cos(value), np.sin(value)]
+            model = theirs.joints[theirs.getJointId(export.model.names[joint.id])]
+            their_q[model.idx_q : model.idx_q + model.nq] = value if model.nq == 1 else [np.cos(value), np.sin(value)]
     data, their_data = export.model.createData(), theirs.createData()
     pin.framesForwardKinematics(export.model, data, q)
     pin.framesForwardKinematics(theirs, their_data, their_q)
@@ -294,13 +294,13 @@ def differences(robot: Mechanism, folder: Path) -> tuple[float, float, bool]:
     """At some closed configurations the largest difference of gravity's loads on the motions of links that the loops
     allow, and of the torques by which motors hold the robot (N, Nm); that of the inertia that these motions meet (to
     the largest); whether motors were compared: where no motor is told by the others."""
-    twin, pinned, other = PinocchioModel(robot), Pinned(robot.to_pinocchio()), Simulated(robot, folder)
+    robot_model, pinned, other = PinocchioModel(robot), Pinned(robot.to_pinocchio()), Simulated(robot, folder)
     model, data, names = pinned.model, pinned.data, pinned.export.motors
     model.gravity.linear, other.model.opt.gravity = GRAVITY, GRAVITY
     links = [link for link in robot.links if link != robot.base]
     driven = [model.joints[model.getJointId(name)].idx_v for name in names]
     acted = [other.model.joint(name).dofadr[0] for name in names]
-    q, start = pinned.export.q0, ClosedConfiguration.of(twin, twin.q0)
+    q, start = pinned.export.q0, ClosedConfiguration.of(robot_model, robot_model.q0)
     torques, inertias, held = 0.0, 0.0, False
     for at in (start, *random_walk(start, 3, steps=3)):
         poses = {link: at.pose(link) for link in robot.links}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hrsynth.geometry.ranks import kernel_basis, largest_angle
-from hrsynth.kinematics.relation import platform_motions, relation
+from hrsynth.kinematics.velocity_relation import platform_motions, relation
 from kinematics.robots import ROBOTS, setting_of
 
 
@@ -14,14 +14,14 @@ from kinematics.robots import ROBOTS, setting_of
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_platform_motions_span_the_twists_and_nothing_idle(robot: str) -> None:
     """J q̇ = 0 and t orthonormal over all feasible twists; q̇ is normal to every q̇ with t = 0."""
-    question = setting_of(robot).everything.question
+    observation_model = setting_of(robot).all_samples.observation_model
     for at in setting_of(robot).configurations:
-        motions = platform_motions(at, question)
-        twists = question.rows(at)[: question.twist_rows]
+        motions = platform_motions(at, observation_model)
+        twists = observation_model.rows(at)[: observation_model.twist_rows]
         t = twists @ motions
-        assert np.linalg.norm(at.twin.jacobian(at.q) @ motions) < 1e-9
+        assert np.linalg.norm(at.model.jacobian(at.q) @ motions) < 1e-9
         np.testing.assert_allclose(t.T @ t, np.eye(motions.shape[1]), atol=1e-9)
-        assert largest_angle(t, relation(at, question).twists) < 1e-9
+        assert largest_angle(t, relation(at, observation_model).twists) < 1e-9
         kernel, _ = at.kernel()
         idle = kernel @ kernel_basis(twists @ kernel, 1.0)[0]
         assert np.linalg.norm(idle.T @ motions) < 1e-9
@@ -29,11 +29,11 @@ def test_platform_motions_span_the_twists_and_nothing_idle(robot: str) -> None:
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_the_platform_generically_does_what_it_does_at_the_samples(robot: str) -> None:
-    setting = setting_of(robot)
-    motion = setting.motion
-    assert motion.dof == setting.dof
-    for at in setting.configurations:
-        twists = relation(at, setting.everything.question).twists
+    setup = setting_of(robot)
+    motion = setup.motion
+    assert motion.dof == setup.dof
+    for at in setup.configurations:
+        twists = relation(at, setup.all_samples.observation_model).twists
         found = motion.twists[: len(twists)]
         assert np.linalg.norm(twists - found @ (found.T @ twists)) < 1e-9
 
@@ -42,8 +42,8 @@ def test_the_platform_generically_does_what_it_does_at_the_samples(robot: str) -
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_measured_again_the_samples_say_the_same(robot: str) -> None:
     """ρ of fewer observations, computed anew, is the projection of ρ of all."""
-    setting = setting_of(robot, ("1",) if "1" in setting_of(robot).labels else None)
-    again = setting.measuring(setting.observed)
-    for old, new in zip(setting.samples.members, again.members, strict=True):
+    setup = setting_of(robot, ("1",) if "1" in setting_of(robot).labels else None)
+    again = setup.measuring(setup.observed)
+    for old, new in zip(setup.samples.members, again.members, strict=True):
         assert largest_angle(old.relation.basis, new.relation.basis) < 1e-9
         assert (old.relation.rank, old.relation.sizes) == (new.relation.rank, new.relation.sizes)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hrsynth.analysis.asked import observe
-from hrsynth.errors import NotMeasured
+from hrsynth.analysis.pose_requests import observe
+from hrsynth.errors import UndefinedValue
 from hrsynth.geometry.gauss_newton import Damping, Residual, descend, descend_together
 from hrsynth.geometry.vectors import Array
+from hrsynth.kinematics.path_tracking import track_paths
 from hrsynth.kinematics.tasks import solve
-from hrsynth.kinematics.tracking import track_paths
 from hrsynth.tolerances import PASSED_BY, SOLVED
 from kinematics.robots import setting_of
 
@@ -21,16 +21,16 @@ from kinematics.robots import setting_of
 )
 def test_together_every_way_ends_where_it_ends_alone(robot: str, see: tuple[str, ...]) -> None:
     """To the last digit, on the ways of samples; the loop here is the one that solves for a single configuration."""
-    setting = observe(robot, camera="c=base@0,0,2/180deg,0,0", see=see, samples=3) if see else setting_of(robot)
-    twin = setting.everything.twin
-    ways = [member.way for member in setting.samples.members]
-    home = setting.samples.question.target(setting.everything.start)
+    setup = observe(robot, camera="c=base@0,0,2/180deg,0,0", see=see, samples=3) if see else setting_of(robot)
+    model = setup.all_samples.model
+    ways = [member.way for member in setup.samples.members]
+    home = setup.samples.observation_model.target(setup.all_samples.start)
     ways += [(home, *way[1:]) for way in ways]  # which are at the same place still where the second target begins
-    for way, led in zip(ways, track_paths(twin, ways), strict=True):
-        assert not isinstance(led, NotMeasured)
-        q, residual = twin.q0, 0.0
+    for way, led in zip(ways, track_paths(model, ways), strict=True):
+        assert not isinstance(led, UndefinedValue)
+        q, residual = model.q0, 0.0
         for target in way:
-            q, residual = solve(twin, q, target, tolerance=SOLVED if target is way[-1] else PASSED_BY, iterations=120)
+            q, residual = solve(model, q, target, tolerance=SOLVED if target is way[-1] else PASSED_BY, iterations=120)
         np.testing.assert_array_equal(led[0], q)
         assert led[1] == residual <= SOLVED
 

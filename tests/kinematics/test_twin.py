@@ -13,7 +13,7 @@ from hrsynth.errors import BadMechanism
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
-from hrsynth.kinematics.relation import Measurement, relation
+from hrsynth.kinematics.velocity_relation import ObservationModel, relation
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Joint, JointType, Mechanism, Motor
 from kinematics.robots import ROBOTS, seen_by_oracle, setting_of, state_of, walked
@@ -70,43 +70,45 @@ def cycle(letters: str, rng: np.random.Generator, welded: bool = False) -> Mecha
     return builder.build(platform=names[2])
 
 
-def agrees(at: ClosedConfiguration, question: Measurement) -> None:
+def agrees(at: ClosedConfiguration, observation_model: ObservationModel) -> None:
     """Closure, mobility and relation are the same for the twin and for the oracle at one configuration."""
-    oracle = Oracle(at.twin.mechanism)
-    state = state_of(at.twin, at.q)
+    oracle = Oracle(at.model.mechanism)
+    state = state_of(at.model, at.q)
     assert oracle.error(state) < AGREE
     kernel, rank = at.kernel()
     assert rank.gap > 1e3
     assert oracle.mobility(state) == kernel.shape[1]
-    ours = relation(at, question)
+    ours = relation(at, observation_model)
     assert ours.mobility == kernel.shape[1]
-    theirs = seen_by_oracle(oracle, state, question, at.twin.length)
+    theirs = seen_by_oracle(oracle, state, observation_model, at.model.length)
     assert same_relation(ours.basis, theirs) < AGREE
-    values = [o.value(at.pose(question.reference), at.pose(o.link)) for o in question.observations]
-    np.testing.assert_allclose(np.reshape(values, (-1, 3)), oracle.directions(state, question.observations), atol=1e-12)
+    values = [o.value(at.pose(observation_model.reference), at.pose(o.link)) for o in observation_model.observations]
+    np.testing.assert_allclose(
+        np.reshape(values, (-1, 3)), oracle.directions(state, observation_model.observations), atol=1e-12
+    )
 
 
-def question_of(mechanism: Mechanism) -> Measurement:
-    return Measurement(mechanism.platform, None, mechanism.reference, mechanism.observations)
+def question_of(mechanism: Mechanism) -> ObservationModel:
+    return ObservationModel(mechanism.platform, None, mechanism.reference, mechanism.observations)
 
 
 @pytest.mark.some(17)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_twin_and_oracle_agree_on_every_robot(robot: str) -> None:
-    everything = setting_of(robot).everything
-    agrees(everything.start, everything.question)
-    for member in everything.members:
-        assert np.linalg.norm(everything.twin.residual(member.configuration.q)) < 1e-10
-        assert np.max(np.abs(member.configuration.q - everything.start.q)) > 0.01
-        agrees(member.configuration, everything.question)
+    all_samples = setting_of(robot).all_samples
+    agrees(all_samples.start, all_samples.observation_model)
+    for member in all_samples.members:
+        assert np.linalg.norm(all_samples.model.residual(member.configuration.q)) < 1e-10
+        assert np.max(np.abs(member.configuration.q - all_samples.start.q)) > 0.01
+        agrees(member.configuration, all_samples.observation_model)
 
 
 @pytest.mark.parametrize("camera", ["platform", "arm_2"])
 def test_twin_and_oracle_agree_with_a_carried_camera(camera: str) -> None:
-    everything = setting_of("delta", None, camera).everything
-    assert everything.question.reference == camera
-    for member in everything.members:
-        agrees(member.configuration, everything.question)
+    all_samples = setting_of("delta", None, camera).all_samples
+    assert all_samples.observation_model.reference == camera
+    for member in all_samples.members:
+        agrees(member.configuration, all_samples.observation_model)
 
 
 @pytest.mark.parametrize("letter", CYCLES)
@@ -114,19 +116,19 @@ def test_twin_and_oracle_agree_with_a_carried_camera(camera: str) -> None:
 def test_every_type_of_loop(letter: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
     mechanism = cycle(CYCLES[letter], rng, welded=letter == "F")
-    twin = PinocchioModel(mechanism)
-    assert letter in {joint.type.value for joint in twin.spanned[1]}
-    assert set(twin.loops) <= set(mechanism.joints)
-    assert np.linalg.norm(twin.residual(twin.q0)) < 1e-12
-    agrees(ClosedConfiguration.of(twin, twin.q0), question_of(mechanism))
-    agrees(walked(twin, seed), question_of(mechanism))
+    model = PinocchioModel(mechanism)
+    assert letter in {joint.type.value for joint in model.spanned[1]}
+    assert set(model.loops) <= set(mechanism.joints)
+    assert np.linalg.norm(model.residual(model.q0)) < 1e-12
+    agrees(ClosedConfiguration.of(model, model.q0), question_of(mechanism))
+    agrees(walked(model, seed), question_of(mechanism))
 
 
-def constrained(twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
+def constrained(robot_model: PinocchioModel, q: Array) -> tuple[Array, Array]:
     """The loops' errors and Jacobian by Pinocchio's own constraints, between the frames that the twin has for them."""
-    model, data = twin.model, twin.model.createData()
+    model, data = robot_model.model, robot_model.model.createData()
     constraints, datas = pin.StdVec_ConstraintModel(), pin.StdVec_ConstraintData()
-    for number, joint in enumerate(twin.spanned[1]):
+    for number, joint in enumerate(robot_model.spanned[1]):
         near, far = model.frames[2 * number + 1], model.frames[2 * number + 2]
         kind = pin.PointAnchorConstraintModel if joint.type is JointType.SPHERICAL else pin.FrameAnchorConstraintModel
         constraints.append(
@@ -145,33 +147,33 @@ def test_loops_are_the_constraints_of_pinocchio(letter: str) -> None:
     """At any configuration, far from closure too, and whichever of two twins was asked last; as do many at once."""
     rng = np.random.default_rng(3)
     twins = [
-        setting_of(letter).everything.twin
+        setting_of(letter).all_samples.model
         if letter in ROBOTS
         else PinocchioModel(cycle(CYCLES[letter], rng, welded=letter == "F"))
         for _ in range(2)
     ]
     twins[1] = PinocchioModel(twins[1].mechanism, 0.3)
     for size in (0.0, 0.01, 0.3, 1.0):
-        places = [twin.integrate(twin.q0, size * rng.normal(size=twin.nv)) for twin in twins]
-        for twin, q in zip(twins, places, strict=True):
-            twin.at(q)
-        for twin, q in zip(twins, places, strict=True):
-            errors, J = constrained(twin, q)
+        places = [model.integrate(model.q0, size * rng.normal(size=model.nv)) for model in twins]
+        for model, q in zip(twins, places, strict=True):
+            model.at(q)
+        for model, q in zip(twins, places, strict=True):
+            errors, J = constrained(model, q)
             assert np.any(J)
             assert size == 0.0 or np.linalg.norm(errors) > 1e-3
-            np.testing.assert_allclose(twin.residual(q), errors, rtol=0, atol=1e-12)
-            np.testing.assert_allclose(twin.jacobian(q), J, rtol=0, atol=1e-12)
-            several = twin.states([twin.q0, q], (twin.mechanism.platform,))
-            np.testing.assert_array_equal(several[0][1], twin.residual(q))
-            np.testing.assert_array_equal(several[1][1], twin.jacobian(q))
-            np.testing.assert_array_equal(several[2][1, 0], twin.poses(q, (twin.mechanism.platform,))[0])
-            np.testing.assert_allclose(several[2][1, 0], twin.pose(q, twin.mechanism.platform), rtol=0, atol=1e-14)
+            np.testing.assert_allclose(model.residual(q), errors, rtol=0, atol=1e-12)
+            np.testing.assert_allclose(model.jacobian(q), J, rtol=0, atol=1e-12)
+            several = model.states([model.q0, q], (model.mechanism.platform,))
+            np.testing.assert_array_equal(several[0][1], model.residual(q))
+            np.testing.assert_array_equal(several[1][1], model.jacobian(q))
+            np.testing.assert_array_equal(several[2][1, 0], model.poses(q, (model.mechanism.platform,))[0])
+            np.testing.assert_allclose(several[2][1, 0], model.pose(q, model.mechanism.platform), rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize("letters", ["RRRRRRR", "UUUU", "CCCC", "ERUUR", "SRSR", "UPSR", "CRSP"])
 def test_mobility_of_a_loop_is_its_freedoms_less_six(letters: str) -> None:
-    twin = PinocchioModel(cycle(letters, np.random.default_rng(5)))
-    assert walked(twin).kernel()[0].shape[1] == sum(JointType(each).freedoms for each in letters) - 6
+    model = PinocchioModel(cycle(letters, np.random.default_rng(5)))
+    assert walked(model).kernel()[0].shape[1] == sum(JointType(each).freedoms for each in letters) - 6
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -188,8 +190,8 @@ def test_random_robots_in_any_cut(kind: str, seed: int) -> None:
     )
     mobilities = set()
     for each in (robot, recut(robot, rng), transformed(robot, random_rotation(rng), rng.normal(size=3))):
-        twin = PinocchioModel(each)
-        at = walked(twin, seed, size=0.05)
+        model = PinocchioModel(each)
+        at = walked(model, seed, size=0.05)
         agrees(at, question_of(each))
         mobilities.add(at.kernel()[0].shape[1])
     assert len(mobilities) == 1
@@ -202,38 +204,40 @@ def central(values: Array, others: Array, h: float) -> Array:
 @pytest.mark.parametrize("robot", ["delta", "quattro", "3upu", "3rrr_m1", "prrrp_parallel_point", "i4l", "3rps"])
 def test_derivatives_of_residual_pose_and_target(robot: str) -> None:
     """Jacobians are what finite differences give: the loops' at closure, poses and targets at any configuration."""
-    everything = setting_of(robot).everything
-    twin, question = everything.twin, everything.question
-    at = everything.members[0].configuration
+    all_samples = setting_of(robot).all_samples
+    model, observation_model = all_samples.model, all_samples.observation_model
+    at = all_samples.members[0].configuration
     h = 1e-6
-    J, V = twin.jacobian(at.q), at.velocity(question.platform)
-    target = question.target(at)
-    _, rows = target.rows(twin, at.q)
-    assert J.shape == (twin.residual(at.q).size, twin.nv)
-    for column in range(twin.nv):
-        step = np.zeros(twin.nv)
+    J, V = model.jacobian(at.q), at.velocity(observation_model.platform)
+    target = observation_model.target(at)
+    _, rows = target.error_and_jacobian(model, at.q)
+    assert J.shape == (model.residual(at.q).size, model.nv)
+    for column in range(model.nv):
+        step = np.zeros(model.nv)
         step[column] = h
-        up, down = twin.integrate(at.q, step), twin.integrate(at.q, -step)
-        np.testing.assert_allclose(central(twin.residual(up), twin.residual(down), h), J[:, column], atol=1e-8)
+        up, down = model.integrate(at.q, step), model.integrate(at.q, -step)
+        np.testing.assert_allclose(central(model.residual(up), model.residual(down), h), J[:, column], atol=1e-8)
         np.testing.assert_allclose(
-            central(target.rows(twin, up)[0], target.rows(twin, down)[0], h), rows[:, column], atol=1e-8
+            central(target.error_and_jacobian(model, up)[0], target.error_and_jacobian(model, down)[0], h),
+            rows[:, column],
+            atol=1e-8,
         )
-        X, Y = twin.pose(up, question.platform), twin.pose(down, question.platform)
-        np.testing.assert_allclose(central(X[:3, 3], Y[:3, 3], h) / twin.length, V[:3, column], atol=1e-8)
-        spin = central(X[:3, :3], Y[:3, :3], h) @ at.pose(question.platform)[:3, :3].T
+        X, Y = model.pose(up, observation_model.platform), model.pose(down, observation_model.platform)
+        np.testing.assert_allclose(central(X[:3, 3], Y[:3, 3], h) / model.length, V[:3, column], atol=1e-8)
+        spin = central(X[:3, :3], Y[:3, :3], h) @ at.pose(observation_model.platform)[:3, :3].T
         np.testing.assert_allclose([spin[2, 1], spin[0, 2], spin[1, 0]], V[3:, column], atol=1e-8)
 
 
 def test_length_only_scales() -> None:
     """A twin in other units of length has the same poses, and the same relation once the unit is the same."""
-    everything = setting_of("delta").everything
-    mechanism, question = everything.twin.mechanism, everything.question
+    all_samples = setting_of("delta").all_samples
+    mechanism, observation_model = all_samples.model.mechanism, all_samples.observation_model
     other = PinocchioModel(mechanism, 3 * mechanism.length)
     at = ClosedConfiguration.of(other, other.q0)
-    np.testing.assert_allclose(at.pose("platform"), everything.start.pose("platform"), atol=1e-14)
-    basis = seen_by_oracle(Oracle(mechanism), state_of(other, other.q0), question, 3 * mechanism.length)
-    assert same_relation(relation(at, question).basis, basis) < AGREE
-    assert same_relation(relation(everything.start, question).basis, basis) > 0.1
+    np.testing.assert_allclose(at.pose("platform"), all_samples.start.pose("platform"), atol=1e-14)
+    basis = seen_by_oracle(Oracle(mechanism), state_of(other, other.q0), observation_model, 3 * mechanism.length)
+    assert same_relation(relation(at, observation_model).basis, basis) < AGREE
+    assert same_relation(relation(all_samples.start, observation_model).basis, basis) > 0.1
 
 
 def test_a_motor_on_a_floating_joint_that_others_hold_is_refused() -> None:
@@ -245,11 +249,11 @@ def test_a_motor_on_a_floating_joint_that_others_hold_is_refused() -> None:
 
 
 def test_actuated_coordinates_are_those_of_the_motors() -> None:
-    twin = setting_of("quattro").everything.twin
-    names = [joint.name for joint in twin.mechanism.joints.values() if joint.actuated]
+    model = setting_of("quattro").all_samples.model
+    names = [joint.name for joint in model.mechanism.joints.values() if joint.actuated]
     assert len(names) == 4
-    assert twin.actuated_indices() == [i for name in names for i in twin.coordinates[name]]
-    assert len(set(twin.actuated_indices())) == 4
+    assert model.actuated_indices() == [i for name in names for i in model.coordinates[name]]
+    assert len(set(model.actuated_indices())) == 4
 
 
 def test_of_two_floating_joints_the_same_is_idle_with_gears() -> None:
@@ -275,11 +279,11 @@ def test_of_two_floating_joints_the_same_is_idle_with_gears() -> None:
 
 def test_motors_on_a_ball_at_which_a_loop_is_cut_hold_both_links_together() -> None:
     robot = load("gough_stewart", motors=["wrist_2", "wrist_5"])
-    twin = PinocchioModel(robot)
-    at = ClosedConfiguration.of(twin, twin.q0)
+    model = PinocchioModel(robot)
+    at = ClosedConfiguration.of(model, model.q0)
     free, _ = at.kernel()
     turns = np.vstack([(at.velocity("platform") - at.velocity(rod))[3:] @ free for rod in ("rod_2", "rod_5")])
-    driven = free[twin.actuated_indices()]
+    driven = free[model.actuated_indices()]
     assert len(driven) == 6
     ranks = [np.linalg.matrix_rank(rows, tol=AGREE) for rows in (driven, turns, np.vstack((driven, turns)))]
     assert ranks[0] == ranks[1] == ranks[2] >= 3

@@ -8,13 +8,13 @@ import pytest
 
 from hrsynth.analysis.check import check
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.batch.reach import reach
+from hrsynth.batch.pose_continuation import reach
 from hrsynth.errors import PoseNotReached
 from hrsynth.geometry.so3 import logarithm
 from hrsynth.geometry.vectors import rotation_about
 from hrsynth.kinematics.assembly import ASSEMBLED, BEYOND, Assembler
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.limits import Stops, wrist_margins
+from hrsynth.kinematics.limits import CoordinateIntervals, wrist_margins
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.normal import normal_form
@@ -106,9 +106,9 @@ def test_perpendicular_neighbours_make_every_turn() -> None:
     rng = np.random.default_rng(0)
     first, second, third = random_rotation(rng).T
     for types in ("RRR", "UR", "RU"):
-        assert not normal_form(chain([first, second, third], rng, types)).mechanism.wrists
+        assert not normal_form(chain([first, second, third], rng, types)).mechanism.tilt_limits
     lean = rotation_about(first, 0.3) @ third
-    assert normal_form(chain([first, second, lean], rng, "UR")).mechanism.wrists
+    assert normal_form(chain([first, second, lean], rng, "UR")).mechanism.tilt_limits
 
 
 def robots(seed: int) -> tuple[ObservedRobot, ObservedRobot, list[np.ndarray]]:
@@ -134,7 +134,7 @@ def turned_platforms(free: ObservedRobot, rng: Rng, count: int) -> list[np.ndarr
 
 def turn_of_tip(at: ClosedConfiguration) -> np.ndarray:
     """The turn of the first tip, seen from the rod."""
-    links = at.twin.mechanism.links
+    links = at.model.mechanism.links
     A, B = (at.pose(link)[:3, :3] @ links[link].pose[:3, :3].T for link in ("upper_1", "platform"))
     return A.T @ B
 
@@ -143,15 +143,15 @@ def turn_of_tip(at: ClosedConfiguration) -> np.ndarray:
 @pytest.mark.parametrize("seed", range(4))
 def test_a_robot_is_assembled_where_its_three_axes_can_turn(seed: int) -> None:
     """Within the limits exactly where three angles exist; beyond them it is proved, by the margins too."""
-    free, setting, axes = robots(seed)
-    (name,) = setting.mechanism.wrists
-    assert setting.batch is None
-    build = Assembler(setting.anatomy, setting.everything.twin.length, setting.mechanism.reference)
+    free, setup, axes = robots(seed)
+    (name,) = setup.mechanism.tilt_limits
+    assert setup.batch is None
+    build = Assembler(setup.decomposition, setup.all_samples.model.length, setup.mechanism.reference)
     # the assembled configuration has a zero of its own, at which no joint has turned
-    zero = {link: setting.mechanism.links[link].pose for link in ("upper_1", "platform")}
+    zero = {link: setup.mechanism.links[link].pose for link in ("upper_1", "platform")}
     seen = set()
     for X in turned_platforms(free, np.random.default_rng(seed), 16):
-        found = build.at({leg.attach: X for leg in setting.anatomy.legs}, ())
+        found = build.at({leg.platform_link: X for leg in setup.decomposition.legs}, ())
         at = found.configuration
         assert at is not None
         A, B = (at.pose(link)[:3, :3] @ zero[link][:3, :3].T for link in ("upper_1", "platform"))
@@ -159,17 +159,17 @@ def test_a_robot_is_assembled_where_its_three_axes_can_turn(seed: int) -> None:
         seen.add(possible)
         assert (found.verdict, found.beyond) == ((ASSEMBLED, ()) if possible else (BEYOND, (name,)))
         for value in (
-            wrist_margins(at.twin, at.q)[name],
-            Stops.of(at.twin, at.q).margins(at.twin, at.q)[name],
-            at.twin.mechanism.wrists[name].margin(),
+            wrist_margins(at.model, at.q)[name],
+            CoordinateIntervals.of(at.model, at.q).margins(at.model, at.q)[name],
+            at.model.mechanism.tilt_limits[name].margin(),
         ):
             assert (value >= 0) == possible
     assert seen == {True, False}
 
 
-def reached(setting: ObservedRobot, pose: Pose) -> ClosedConfiguration | PoseNotReached:
+def reached(setup: ObservedRobot, pose: Pose) -> ClosedConfiguration | PoseNotReached:
     try:
-        return reach(setting.everything.start, setting.everything.question, pose, setting.motion)
+        return reach(setup.all_samples.start, setup.all_samples.observation_model, pose, setup.motion)
     except PoseNotReached as error:
         return error
 
@@ -179,12 +179,12 @@ def reached(setting: ObservedRobot, pose: Pose) -> ClosedConfiguration | PoseNot
 def test_a_way_ends_where_the_three_axes_turn_no_further(seed: int) -> None:
     """What is reached has three angles; else, and where the way to it passes where there are none, the answer names the
     joint. The robot with an S reaches all."""
-    free, setting, axes = robots(seed)
-    (name,) = setting.mechanism.wrists
+    free, setup, axes = robots(seed)
+    (name,) = setup.mechanism.tilt_limits
     count = {True: 0, False: 0}
     for X in turned_platforms(free, np.random.default_rng(seed), 8):
         pose = Pose.of(X)
-        there, here = reached(free, pose), reached(setting, pose)
+        there, here = reached(free, pose), reached(setup, pose)
         assert isinstance(there, ClosedConfiguration)
         if isinstance(here, ClosedConfiguration):
             assert three_angles(axes, turn_of_tip(here)) is not None
@@ -207,6 +207,6 @@ def test_check_says_where_three_axes_lie_in_a_plane(apart: float) -> None:
     found = check(serial(free, rng, free.joints["tip_1"], axes))
     assert np.linalg.svd(np.array(axes), compute_uv=False)[-1] == pytest.approx(apart / np.sqrt(2), rel=1e-1)
     (posture,) = found.postures
-    assert not posture.beyond
-    assert posture.flat_wrists == ({"tip_1__1": pytest.approx(apart, abs=1e-9)} if apart < 0.01 else {})
+    assert not posture.beyond_limits
+    assert posture.singular_spherical_joints == ({"tip_1__1": pytest.approx(apart, abs=1e-9)} if apart < 0.01 else {})
     assert ("in two ways: not counted" in str(found)) is (apart < 0.01)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from lxml import etree
 
-from hrsynth.description import load, save, shipped
+from hrsynth.description import list_robots, load, save
 
 Root = etree._Element
 Damage = Callable[[Root], None]
@@ -38,7 +38,7 @@ def inertial(dialect: str, mass: float = 1.5) -> Root:
 def sound(name: str = "3rrr_m1", ending: str = ".urdf", folder: Path | None = None) -> str:
     """A shipped robot in a dialect, with masses, and limits of its motors."""
     if ending == ".urdf":
-        root = etree.fromstring(shipped()[name].read_bytes(), etree.XMLParser(remove_blank_text=True))
+        root = etree.fromstring(list_robots()[name].read_bytes(), etree.XMLParser(remove_blank_text=True))
     else:
         assert folder is not None
         save(load(name), folder / f"{name}{ending}")
@@ -121,9 +121,9 @@ def again(path: str, name: str) -> Damage:
     """Append the first element on a path once more, under another name."""
 
     def damage(root: Root) -> None:
-        twin = copy.deepcopy(root.find(path))
-        twin.set("name", name)
-        root.find(path).getparent().append(twin)
+        model = copy.deepcopy(root.find(path))
+        model.set("name", name)
+        root.find(path).getparent().append(model)
 
     return damage
 

@@ -275,8 +275,8 @@ def test_one_line_files_keep_their_names(tmp_path: Path):
     root = etree.fromstring(sound(), etree.XMLParser(remove_blank_text=True))
     path = tmp_path / "robot.urdf"
     path.write_text(etree.tostring(root, encoding="unicode"))
-    twin = damaged(path.read_text(), put('link[@name="prox_1"]/inertial/mass', value="-1.5"))
-    path.write_text(twin.replace("\n", ""))
+    model = damaged(path.read_text(), put('link[@name="prox_1"]/inertial/mass', value="-1.5"))
+    path.write_text(model.replace("\n", ""))
     found = hrsynth.lint(path, fix=True)
     assert [each.rule for each in found.mended] == ["mass-negative"]
     assert not found.reaches("warning")

@@ -257,7 +257,7 @@ def test_json_and_fix_on_the_command_line(bad: Path, capsys):
     assert execute(["lint", str(bad), "--fix", "-o", "mended.urdf", "--format", "json"]) == 0
     record = json.loads(capsys.readouterr().out)
     assert record["file"] == "mended.urdf"
-    assert [(each["rule"], each["mends"]) for each in record["mended"]] == [("limits-order", True)]
+    assert [(each["rule"], each["fixable"]) for each in record["mended"]] == [("limits-order", True)]
     assert record["counts"]["error"] == 0
     assert execute(["lint", str(bad), "--fix"]) == 0
     assert f"The mended file is written to {bad}." in capsys.readouterr().out
@@ -296,7 +296,7 @@ def test_what_is_mended_only_where_a_rule_says_so(tmp_path: Path):
         if case.ending == ".urdf" and case.robot == "3rrr_m1":
             path.write_text(damaged(sound(), case.damage))
             found = hrsynth.lint(path, ignore=("constraint-dead", "constraint-redundant", "motors-few", "motors-many"))
-            assert all(lint_rules()[each.rule].mends for each in found.findings if each.mends)
+            assert all(lint_rules()[each.rule].fixable for each in found.findings if each.fixable)
 
 
 def test_a_mend_of_a_file_that_xacro_made_is_left_to_its_source(tmp_path: Path):
@@ -312,7 +312,7 @@ def test_a_mend_of_a_file_that_xacro_made_is_left_to_its_source(tmp_path: Path):
     negative = [each for each in found.findings if each.rule == "mass-negative"]
     (tmp_path / "plain.urdf").write_text(text)
     (plain,) = (each for each in hrsynth.lint(tmp_path / "plain.urdf").findings if each.rule == "mass-negative")
-    assert [(each.line, each.mends) for each in negative] == [(plain.line, False)]
+    assert [(each.line, each.fixable) for each in negative] == [(plain.line, False)]
     assert (found.written, found.mended) == (None, ())
 
 

@@ -75,11 +75,11 @@ def test_all_defects_of_a_random_robot_are_found_and_mended(robot: Mechanism, se
         one, two = Path(folder) / "sound.urdf", Path(folder) / "damaged.urdf"
         one.write_text(text)
         two.write_text(damaged(text, both(*(DEFECTS[name] for name in order))))
-        assert not any(each.mends for each in hrsynth.lint(one).findings)
+        assert not any(each.fixable for each in hrsynth.lint(one).findings)
         assert set(order) <= {each.rule for each in hrsynth.lint(two).findings}
         found = hrsynth.lint(two, fix=True)
         assert {each.rule for each in found.mended} == set(order)
-        assert not any(each.mends for each in found.findings)
+        assert not any(each.fixable for each in found.findings)
         differences = load(two).differences(load(one))
         assert [each for each in differences if "limits of joint" not in each and "content of link" not in each] == []
 
@@ -97,7 +97,7 @@ def outcome(files: dict[str, str], folder: Path, *, fix: bool) -> str:
     assert sarif(found)
     assert len(github(found).splitlines()) == len(found.findings)
     if fix:
-        assert not any(each.mends for each in found.findings)
+        assert not any(each.fixable for each in found.findings)
     return "mended" if found.written else "read"
 
 

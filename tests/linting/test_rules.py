@@ -14,11 +14,11 @@ import hrsynth
 from description.foreign.examples import FILES, URDF
 from description.foreign.rounded import exported, of_hinges
 from description.foreign.test_dialects import written
-from hrsynth.description import load, save, shipped
+from hrsynth.description import list_robots, load, save
 from hrsynth.errors import BadRequest, BadRobotFile
 from hrsynth.linting.elements import inertials
+from hrsynth.linting.linted_file import LintedFile
 from hrsynth.linting.rules import lint_rules
-from hrsynth.linting.subject import LintedFile
 from hrsynth.mechanism.normal import normal_form
 from linting.defects import CASES, Case, damaged, foreign, put, rounded, sound
 from strategies import planar, random_rotation, transformed
@@ -61,7 +61,7 @@ def test_every_rule_has_a_case():
 
 
 @pytest.mark.some(3)
-@pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.rule}{case.ending}")
+@pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.rule}{case.run_outcome}")
 def test_a_rule_finds_its_defect_and_no_other(case: Case, tmp_path: Path, shelf: Path):
     _, two = files(case, tmp_path, shelf)
     _, before = sound_file(case.robot, case.ending, shelf)
@@ -74,11 +74,11 @@ def test_a_rule_finds_its_defect_and_no_other(case: Case, tmp_path: Path, shelf:
     assert new <= {case.rule, *case.follows}
 
 
-MENDED = [case for case in CASES if lint_rules()[case.rule].mends]
+MENDED = [case for case in CASES if lint_rules()[case.rule].fixable]
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize("case", MENDED, ids=lambda case: f"{case.rule}{case.ending}")
+@pytest.mark.parametrize("case", MENDED, ids=lambda case: f"{case.rule}{case.run_outcome}")
 def test_what_is_mended_is_the_sound_file_again(case: Case, tmp_path: Path, shelf: Path):
     one, two = files(case, tmp_path, shelf)
     before = two.read_bytes()
@@ -112,7 +112,7 @@ def test_what_is_mended_hides_the_same_robot(rule: str, tmp_path: Path, shelf: P
     assert mended.hidden_architecture == before.hidden_architecture
     assert mended.verdict.verdict == before.verdict.verdict
     assert (mended.dof, mended.mobility) == (before.dof, before.mobility)
-    assert mended.certificate.passed
+    assert mended.equivalence.passed
 
 
 @pytest.mark.parametrize(
@@ -195,7 +195,7 @@ def test_degrees_beside_radians_are_told_and_left(tmp_path: Path, shelf: Path):
         element.attrib.update(values)
         path.write_bytes(etree.tostring(tree))
         found = [each for each in hrsynth.lint(path, fix=True).findings if each.rule in ("unit-angles", "unit-limits")]
-        assert [each.mends for each in found] == [False]
+        assert [each.fixable for each in found] == [False]
         assert all(text in path.read_text() for text in values.values())
 
 
@@ -258,7 +258,7 @@ def test_redundant_constraints_are_named_and_counted(tmp_path: Path):
     assert [each.message for each in found] == [
         f"3 of the 5 constraints of 'wrist_{leg}' repeat those of the loops before it" for leg in (2, 3)
     ]
-    assert rules_in(shipped()["gough_stewart"])["constraint-redundant"] == 0
+    assert rules_in(list_robots()["gough_stewart"])["constraint-redundant"] == 0
 
 
 @pytest.mark.some(1)
@@ -273,7 +273,7 @@ def test_rounded_geometry_is_found_and_written_as_it_is_meant(decimals: int, nat
     damage = rounded(decimals) if native else foreign(rounded(decimals))
     two.write_text(damaged(one.read_text(), damage))
     found = hrsynth.lint(two, platform=None if native else made.platform)
-    assert {each.rule for each in found.findings if each.mends} == {"geometry-rounded"}
+    assert {each.rule for each in found.findings if each.fixable} == {"geometry-rounded"}
     mended = hrsynth.lint(two, fix=True, platform=None if native else made.platform)
     assert not {"geometry-rounded", "refused", "loop-open"} & {each.rule for each in mended.findings}
     before, after = load(one), load(two, platform=made.platform) if not native else load(two)
@@ -388,8 +388,8 @@ def test_frames_of_consecutive_joints_may_coincide(tmp_path: Path, joints: tuple
 def test_what_a_format_lacks_is_named_with_its_line(
     tmp_path: Path, change: tuple[str, ...], line: str, says: str, severity: str
 ):
-    text = shipped()["3rrr_m1"].read_text()
-    assert rules_in(shipped()["3rrr_m1"])["element-unknown"] == 0
+    text = list_robots()["3rrr_m1"].read_text()
+    assert rules_in(list_robots()["3rrr_m1"])["element-unknown"] == 0
     path = tmp_path / "robot.urdf"
     for old, new in zip(change[::2], change[1::2], strict=True):
         assert old in text
@@ -400,7 +400,7 @@ def test_what_a_format_lacks_is_named_with_its_line(
     for each in found:
         assert says in each.message
         assert each.severity == severity
-        first = shipped()["3rrr_m1"].read_text().split(line)[0].count("\n") + 1
+        first = list_robots()["3rrr_m1"].read_text().split(line)[0].count("\n") + 1
         assert each.line == first + ("predecessor" in line)
 
 
@@ -449,7 +449,7 @@ def test_what_is_open_on_purpose_is_not_told_to_close(tmp_path: Path, robot: str
 
 
 SOME = ("3rps", "rrrrr_m1")
-NAMES = [name if name in SOME else pytest.param(name, marks=pytest.mark.slow) for name in shipped()]
+NAMES = [name if name in SOME else pytest.param(name, marks=pytest.mark.slow) for name in list_robots()]
 
 
 @pytest.mark.some(3, 12)
@@ -463,7 +463,7 @@ def test_shipped_robots_raise_no_alarm_in_any_dialect(name: str, ending: str, tm
     found = hrsynth.lint(path, compare=name)
     loud = [each for each in found.findings if each.severity != "note"]
     assert [each.rule for each in loud] == ["motors-many"] * (name == "quattro_rigid")  # four motors, three freedoms
-    assert not any(each.mends for each in found.findings)
+    assert not any(each.fixable for each in found.findings)
 
 
 @pytest.mark.some(7)

@@ -6,11 +6,11 @@ import numpy as np
 
 from hrsynth.geometry.vectors import Array, inverse, unit
 from hrsynth.mechanism import Direction, Mechanism
-from hrsynth.mechanism.carried import Tie
+from hrsynth.mechanism.incidences import Incidences, recognise
 from hrsynth.mechanism.legs import decompose
 from hrsynth.mechanism.normal import normal_form
-from hrsynth.mechanism.relations import Relations, recognise
 from hrsynth.mechanism.sensors import default_observation
+from hrsynth.mechanism.structural_incidences import GeometricIncidence
 from oracle import Oracle
 
 
@@ -20,7 +20,7 @@ def walked(mechanism: Mechanism, n: int, seed: int) -> list[Array]:
     return [oracle.zero(), *oracle.random_walk(np.random.default_rng(seed), n, 0.15)]
 
 
-def recognised(mechanism: Mechanism, states: list[Array], point: Array | None = None) -> Relations:
+def recognised(mechanism: Mechanism, states: list[Array], point: Array | None = None) -> Incidences:
     poses = {name: np.array([state[i] for state in states]) for i, name in enumerate(mechanism.links)}
     return recognise(mechanism, poses, segments(mechanism), point)
 
@@ -31,11 +31,13 @@ def segments(mechanism: Mechanism) -> list[Direction]:
 
 def observed(mechanism: Mechanism) -> Mechanism:
     """The normal form with the default segments of its legs."""
-    anatomy = decompose(normal_form(mechanism).mechanism)
-    return anatomy.mechanism.changed(observations=tuple(default_observation(anatomy, leg) for leg in anatomy.legs))
+    decomposition = decompose(normal_form(mechanism).mechanism)
+    return decomposition.mechanism.changed(
+        observations=tuple(default_observation(decomposition, leg) for leg in decomposition.legs)
+    )
 
 
-def miss(tie: Tie, mechanism: Mechanism, relations: Relations, state: Array) -> float:
+def miss(tie: GeometricIncidence, mechanism: Mechanism, relations: Incidences, state: Array) -> float:
     """By how much a relation fails in a state of the oracle: a sine, or characteristic lengths; 0 where a centre of it
     is none of a joint."""
     moved = {name: state[i] @ inverse(link.pose) for i, (name, link) in enumerate(mechanism.links.items())}

@@ -10,12 +10,12 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from hrsynth.description import load, shipped
+from hrsynth.description import list_robots, load
 from hrsynth.geometry.vectors import Array
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
-from hrsynth.mechanism.carried import Tie, carried_by_joints, ties
-from hrsynth.mechanism.relations import Relations
+from hrsynth.mechanism.incidences import Incidences
+from hrsynth.mechanism.structural_incidences import GeometricIncidence, carried_by_joints, ties
 from mechanism.relating import miss, observed, recognised, walked
 from oracle import NotAssembled, Oracle, Undecided
 from strategies import parallel_robots, planar, random_rotation, spherical, transformed
@@ -39,7 +39,7 @@ def scattered(mechanism: Mechanism, tries: int, seed: int) -> Iterator[Array]:
             return
 
 
-def by_the_file(mechanism: Mechanism, relations: Relations) -> list[Tie]:
+def by_the_file(mechanism: Mechanism, relations: Incidences) -> list[GeometricIncidence]:
     every = ties(relations)
     return [tie for tie, holds in zip(every, carried_by_joints(mechanism, relations, every), strict=True) if holds]
 
@@ -56,7 +56,7 @@ def check(mechanism: Mechanism, seed: int, tries: int) -> int:
 
 
 @pytest.mark.some(6)
-@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("name", list_robots())
 def test_what_is_carried_holds_in_all_modes(name: str) -> None:
     assert check(observed(load(name)), seed=1, tries=60) > 0
 
@@ -72,7 +72,7 @@ def test_what_is_carried_holds_on_random_robots(mechanism: Mechanism, seed: int)
 
 
 @pytest.mark.some(11)
-@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("name", list_robots())
 def test_zero_alone_carries_nothing_that_motion_breaks(name: str) -> None:
     """What holds by accident at zero is not carried: all that is carried from zero alone is found over a walk too."""
     robot = observed(load(name))
@@ -132,6 +132,6 @@ def test_a_watched_link_is_kept_with_its_relation() -> None:
     robot = observed(load("delta"))
     relations = recognised(robot, walked(robot, 2, seed=1))
     assert relations.watched == tuple(o.link for o in robot.observations)
-    tie = Tie("seen", links=("platform",), sight=relations.sights[0])
+    tie = GeometricIncidence("seen", links=("platform",), sight=relations.sights[0])
     assert not carried_by_joints(robot, relations, [tie])[0]
     assert carried_by_joints(robot, relations, [replace(tie, links=(relations.watched[0],))])[0]

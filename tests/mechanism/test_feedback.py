@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hrsynth.geometry.vectors import Array, inverse, pose, unit
+from hrsynth.mechanism.cameras import CameraObservation, NamedCamera
 from hrsynth.mechanism.images import HALF_PICTURE
 from hrsynth.mechanism.observation import Observation
 from hrsynth.mechanism.observations import kinds
@@ -16,7 +17,6 @@ from hrsynth.mechanism.observations.encoder import AngleEncoder, SlideEncoder
 from hrsynth.mechanism.observations.image_circle import ImageCircle
 from hrsynth.mechanism.observations.image_line import ImageLine
 from hrsynth.mechanism.observations.point import ImagePoint
-from hrsynth.mechanism.sights import CameraObservation, NamedCamera
 from mechanism.test_kinds import CHAINED, Rng, far, moved, random_pose
 from strategies import random_direction, random_rotation
 

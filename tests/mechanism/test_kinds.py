@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 
 from hrsynth.errors import BadMechanism
 from hrsynth.geometry.vectors import Array, pose, unit
+from hrsynth.mechanism.cameras import CameraObservation, NamedCamera, VirtualJoint
 from hrsynth.mechanism.model import JointType
 from hrsynth.mechanism.observation import Observation
 from hrsynth.mechanism.observations import kinds
 from hrsynth.mechanism.observations.encoder import AngleEncoder, Encoder, SlideEncoder
 from hrsynth.mechanism.screws import allowed_twists
-from hrsynth.mechanism.sights import CameraObservation, NamedCamera, VirtualJoint
 from oracle import exponential
 from strategies import random_direction, random_rotation
 

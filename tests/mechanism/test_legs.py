@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import strategies
-from hrsynth.description import load, save, shipped
+from hrsynth.description import list_robots, load, save
 from hrsynth.errors import BadMechanism, BadRequest, BadRobotFile
 from hrsynth.mechanism import Direction, Mechanism
 from hrsynth.mechanism.builder import Builder
@@ -37,17 +37,17 @@ def test_articulated_platforms_are_found(name: str, platform: set[str]) -> None:
     assert set(anatomy(name).platform) == platform
 
 
-@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("name", list_robots())
 def test_legs_share_no_link_and_end_on_the_platform(name: str) -> None:
     found = anatomy(name)
     links = [link for leg in found.legs for link in leg.links]
     assert len(links) == len(set(links))
     assert not set(links) & {found.mechanism.base, *found.platform}
-    assert all(leg.attach in found.platform for leg in found.legs)
+    assert all(leg.platform_link in found.platform for leg in found.legs)
     assert set(links) | {found.mechanism.base, *found.platform} == set(found.mechanism.links)
 
 
-@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("name", list_robots())
 def test_default_segments_have_a_direction_from_base_to_platform(name: str) -> None:
     found = anatomy(name)
     for leg in found.legs:
@@ -185,9 +185,9 @@ def test_a_tool_on_one_revolute_keeps_its_turn() -> None:
     wrist = tool.joints["wrist"].relinked("base", "platform")
     with_tool = robot.changed(links=[tool.links["tool"]], joints=[wrist], platform="tool")
     found = derive(with_tool)
-    assert (found.dof, found.mobility.total, found.mobility.idle) == (4, 4, 0)
+    assert (found.dof, found.mobility.total, found.mobility.internal) == (4, 4, 0)
     assert found.verdict.verdict == "partially controllable"
-    assert [freedom.name for freedom in found.verdict.lost] == ["rotation about the axis of wrist"]
+    assert [freedom.name for freedom in found.verdict.unobserved] == ["rotation about the axis of wrist"]
 
 
 def bars_below_rods(watch: str) -> Mechanism:
@@ -235,4 +235,4 @@ def test_what_is_watched_is_in_a_leg_and_not_in_the_platform() -> None:
         unseen = basis[:6] @ right[int((sizes > 1e-8).sum()) :].T
         lost = int((np.linalg.svd(unseen, compute_uv=False) > 1e-8).sum())
         verdict = derive(robot).verdict
-        assert (verdict.dof, len(verdict.lost)) == (6, lost)
+        assert (verdict.dof, len(verdict.unobserved)) == (6, lost)

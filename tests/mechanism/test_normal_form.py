@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import strategies
-from hrsynth.description import load, shipped
+from hrsynth.description import list_robots, load
 from hrsynth.errors import BadMechanism
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
@@ -96,7 +96,7 @@ def test_a_platform_fixed_to_the_base_is_refused() -> None:
 
 
 @pytest.mark.some(16)
-@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("name", list_robots())
 def test_what_is_split_comes_together_again(name: str) -> None:
     robot = normal_form(load(name)).mechanism
     parts = normal_form(strategies.split(load(name), np.random.default_rng(0))).mechanism
@@ -104,7 +104,7 @@ def test_what_is_split_comes_together_again(name: str) -> None:
     assert len(parts.links) == len(robot.links)
 
 
-@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("name", list_robots())
 def test_a_normal_form_is_its_own(name: str) -> None:
     once = normal_form(load(name)).mechanism
     assert normal_form(once).mechanism.differences(once) == []

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from hrsynth.description import load, shipped
+from hrsynth.description import list_robots, load
 from hrsynth.errors import BadRequest
 from hrsynth.mechanism.legs import decompose
 from hrsynth.mechanism.normal import normal_form
@@ -65,7 +65,7 @@ def test_what_is_no_architecture_is_refused_with_its_place(text: str) -> None:
         parse(text)
 
 
-@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("name", list_robots())
 def test_every_shipped_robot_prints_the_architecture_of_its_table(name: str) -> None:
     from hrsynth.families.table import ROBOTS
 

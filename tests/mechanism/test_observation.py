@@ -74,8 +74,8 @@ def test_together_is_one_by_one(seed: int) -> None:
 
 def test_every_kind_has_a_key_of_its_own() -> None:
     for robot in ROBOTS:
-        setting = setting_of(robot)
-        keys = [o.key for o in setting.observed] + [each.observation.key for each in candidates(setting)]
+        setup = setting_of(robot)
+        keys = [o.key for o in setup.observed] + [each.observation.key for each in candidates(setup)]
         assert len(set(keys)) == len(keys)
 
 
@@ -88,18 +88,18 @@ def test_every_kind_has_a_key_of_its_own() -> None:
 def test_encoders_read_the_coordinates_of_the_twin(robot: str, cut: str) -> None:
     """Value and rate, of tree joints and of cut ones; lengths in characteristic lengths."""
     mechanism = setting_of(robot).mechanism if cut == "normal form" else load(robot)
-    twin = PinocchioModel(mechanism)
-    at = walked(twin, seed=1)
+    model = PinocchioModel(mechanism)
+    at = walked(model, seed=1)
     kernel, _ = at.kernel()
-    travelled = pin.difference(twin.model, twin.q0, at.q)
+    travelled = pin.difference(model.model, model.q0, at.q)
     number = 0
     for joint in mechanism.joints.values():
         found = encoders(mechanism, joint)
         assert len(found) == (0 if joint.type in ("S", "E", "F", "6") else joint.type.freedoms)
         if not found:
             continue
-        _, _, values, rates = measure(twin, at.q, mechanism.reference, found)
-        for place, value, rate in zip(twin.coordinates[joint.name], values, rates, strict=True):
+        _, _, values, rates = measure(model, at.q, mechanism.reference, found)
+        for place, value, rate in zip(model.coordinates[joint.name], values, rates, strict=True):
             np.testing.assert_allclose(rate @ kernel, kernel[[place]], atol=1e-9)
             assert value[0] == pytest.approx(travelled[place], abs=1e-9)
             number += 1
@@ -120,15 +120,15 @@ def test_encoders_of_each_type_in_a_tilted_chain(type: str) -> None:
     builder.joint("j", type, "a", "b", rng.normal(size=3), axis=first, axis2=second if type == "U" else None)
     mechanism = builder.build(platform="b")
     for each in (mechanism, mechanism.changed(joints=[mechanism.joints["j"].turned()])):
-        twin = PinocchioModel(each)
-        q = twin.integrate(twin.q0, rng.uniform(-1, 1, size=twin.nv))
+        model = PinocchioModel(each)
+        q = model.integrate(model.q0, rng.uniform(-1, 1, size=model.nv))
         found = encoders(each, each.joints["j"])
-        _, _, values, rates = measure(twin, q, "base", found)
-        travelled = pin.difference(twin.model, twin.q0, q)
-        places = twin.coordinates["j"]
+        _, _, values, rates = measure(model, q, "base", found)
+        travelled = pin.difference(model.model, model.q0, q)
+        places = model.coordinates["j"]
         assert len(found) == len(places) == JointType(type).freedoms
         np.testing.assert_allclose(np.concatenate(values), travelled[list(places)], atol=1e-12)
-        np.testing.assert_allclose(np.vstack(rates), np.eye(twin.nv)[list(places)], atol=1e-12)
+        np.testing.assert_allclose(np.vstack(rates), np.eye(model.nv)[list(places)], atol=1e-12)
 
 
 @pytest.mark.some(11)
@@ -136,22 +136,22 @@ def test_encoders_of_each_type_in_a_tilted_chain(type: str) -> None:
 def test_rates_and_values_of_candidates_have_the_same_units(robot: str) -> None:
     """Whatever could be measured: its rate is the derivative of its value along any motion of the spanning tree, and
     lengths are relative to the twin's own."""
-    setting = setting_of(robot, ("1",))
-    mechanism = setting.mechanism
-    observations = [each.observation for each in candidates(setting)]
+    setup = setting_of(robot, ("1",))
+    mechanism = setup.mechanism
+    observations = [each.observation for each in candidates(setup)]
     rng = np.random.default_rng(5)
     q_step = rng.normal(size=PinocchioModel(mechanism).nv)
     found = []
     for length in (mechanism.length, 1.0):
-        twin = PinocchioModel(mechanism, length)
-        slides = [i for j in mechanism.joints.values() if j.type.slides for i in twin.coordinates[j.name][:1]]
+        model = PinocchioModel(mechanism, length)
+        slides = [i for j in mechanism.joints.values() if j.type.slides for i in model.coordinates[j.name][:1]]
         step = q_step.copy()
         step[slides] /= length
-        q = twin.integrate(twin.q0, 0.1 * step)
+        q = model.integrate(model.q0, 0.1 * step)
         ahead, behind = (
-            measure(twin, twin.integrate(q, s * step), mechanism.reference, observations)[2] for s in (STEP, -STEP)
+            measure(model, model.integrate(q, s * step), mechanism.reference, observations)[2] for s in (STEP, -STEP)
         )
-        _, _, values, rates = measure(twin, q, mechanism.reference, observations)
+        _, _, values, rates = measure(model, q, mechanism.reference, observations)
         for a, b, rate in zip(ahead, behind, rates, strict=True):
             np.testing.assert_allclose(rate @ step, (a - b) / (2 * STEP), rtol=1e-6, atol=1e-6)
         found.append([(o.dimension, value) for o, value in zip(observations, values, strict=True)])
@@ -169,12 +169,12 @@ def test_what_is_measured_does_not_depend_on_what_else_is_asked(robot: str) -> N
     alone = [measure(PinocchioModel(mechanism), q, mechanism.reference, [each]) for each in observations]
     links = tuple(mechanism.links)
     for asked in ((), (mechanism.platform,), (*links, mechanism.platform)):
-        twin = PinocchioModel(mechanism)
+        model = PinocchioModel(mechanism)
         for _ in range(2):
-            X, V, values, rates = measure(twin, q, mechanism.reference, observations, asked)
+            X, V, values, rates = measure(model, q, mechanism.reference, observations, asked)
             for link, pose_, velocity in zip(asked, X, V, strict=True):
-                np.testing.assert_array_equal(pose_, twin.poses(q, (link,))[0])
-                np.testing.assert_array_equal(velocity, twin.velocity(q, link))
+                np.testing.assert_array_equal(pose_, model.poses(q, (link,))[0])
+                np.testing.assert_array_equal(velocity, model.velocity(q, link))
             for (_, _, (value,), (rate,)), other, moving in zip(alone, values, rates, strict=True):
                 np.testing.assert_allclose(other, value, rtol=0, atol=1e-13)
                 np.testing.assert_allclose(moving, rate, rtol=0, atol=1e-13)
@@ -189,11 +189,11 @@ def test_a_split_universal_joint_has_the_encoders_of_its_halves() -> None:
     parts = [name for name in halves.joints if name.startswith(gone + "__")]
     rows = []
     for mechanism, names in ((whole, [gone]), (halves, parts)):
-        twin = PinocchioModel(mechanism, whole.length)
+        model = PinocchioModel(mechanism, whole.length)
         found = [each for name in names for each in encoders(mechanism, mechanism.joints[name])]
         assert len(found) == 2
-        _, V, _, rates = measure(twin, twin.q0, mechanism.reference, found, tuple(whole.links))
-        kernel, _ = ClosedConfiguration.of(twin, twin.q0).kernel()
+        _, V, _, rates = measure(model, model.q0, mechanism.reference, found, tuple(whole.links))
+        kernel, _ = ClosedConfiguration.of(model, model.q0).kernel()
         rows.append(np.vstack([*V, *rates]) @ kernel)
     ranks = [np.linalg.matrix_rank(each, tol=1e-8) for each in (*rows, np.hstack(rows))]
     assert ranks[0] == ranks[1] == ranks[2] > 0
@@ -237,11 +237,11 @@ def test_with_its_direction_a_moment_tells_the_same_about_any_origin(seed: int) 
 @pytest.mark.parametrize("robot", ["3rrr_m1", "gough_stewart", "hexaglide", "delta", "rrrrr_m1", "3prp"])
 def test_an_observed_line_is_that_of_the_segment(robot: str) -> None:
     """The line lies along the direction; where the segment is binary it meets the centres or axes of both joints."""
-    setting = setting_of(robot)
-    mechanism = setting.mechanism
-    for seen in setting.observed:
+    setup = setting_of(robot)
+    mechanism = setup.mechanism
+    for seen in setup.observed:
         assert isinstance(seen, Direction)
-        line = observed_line(setting.anatomy, seen)
+        line = observed_line(setup.decomposition, seen)
         assert line.key != seen.key
         X = mechanism.links[seen.link].pose
         u, p = X[:3, :3] @ line.axis, X[:3, :3] @ line.at + X[:3, 3]
@@ -262,7 +262,7 @@ def gap(joint: Joint, p: Array, u: Array) -> float:
 
 
 def test_a_line_keeps_the_link_it_is_seen_from() -> None:
-    setting = setting_of("delta")
-    seen = replace(setting.observed[0], seen_from="platform")
+    setup = setting_of("delta")
+    seen = replace(setup.observed[0], seen_from="platform")
     assert isinstance(seen, Direction)
-    assert observed_line(setting.anatomy, seen).seen_from == "platform"
+    assert observed_line(setup.decomposition, seen).seen_from == "platform"

@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hrsynth.description import load, shipped
+from hrsynth.description import list_robots, load
 from hrsynth.geometry.incidences import Incidence
 from hrsynth.geometry.vectors import Array, inverse, unit
 from hrsynth.mechanism import Direction, Mechanism
 from hrsynth.mechanism.builder import Builder
+from hrsynth.mechanism.incidences import Incidences
 from hrsynth.mechanism.normal import normal_form
-from hrsynth.mechanism.relations import Relations
 from hrsynth.mechanism.screws import constraints
 from mechanism.relating import observed, recognised, segments, walked
 from oracle import Oracle
@@ -27,7 +27,7 @@ Rng = np.random.Generator
 class Here:
     """Directions and centres of relations at one configuration, worked out joint by joint."""
 
-    def __init__(self, mechanism: Mechanism, relations: Relations, state: Array) -> None:
+    def __init__(self, mechanism: Mechanism, relations: Incidences, state: Array) -> None:
         self.mechanism = mechanism
         moved = {name: state[i] @ inverse(link.pose) for i, (name, link) in enumerate(mechanism.links.items())}
         self.classes: dict[int, list[Array]] = {}
@@ -45,7 +45,7 @@ class Here:
             if sight.kind == "class":
                 self.classes.setdefault(sight.classes[0], []).append(u)
 
-    def misses(self, relations: Relations) -> Iterator[float]:
+    def misses(self, relations: Incidences) -> Iterator[float]:
         """By how much each relation fails."""
         axis = {number: directions[0] for number, directions in self.classes.items()}
         for directions in self.classes.values():
@@ -79,7 +79,7 @@ class Here:
 
 
 @pytest.mark.some(6)
-@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("name", list_robots())
 def test_relations_hold_wherever_the_robot_goes(name: str) -> None:
     """What holds at three configurations holds at others on another path."""
     robot = observed(load(name))
@@ -89,7 +89,7 @@ def test_relations_hold_wherever_the_robot_goes(name: str) -> None:
 
 
 @pytest.mark.some(8)
-@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("name", list_robots())
 def test_the_constraints_in_screws_are_those_of_the_oracle(name: str) -> None:
     """The kernel of A, built from centres and axes where the robot is, is T_qC."""
     robot = normal_form(load(name)).mechanism

@@ -13,7 +13,7 @@ from lxml import etree
 
 import strategies
 from hrsynth.analysis.derive import derive
-from hrsynth.description import load, shipped
+from hrsynth.description import list_robots, load
 from hrsynth.errors import BadRequest
 from hrsynth.mechanism import JointType, Mechanism
 from hrsynth.mechanism.legs import decompose
@@ -29,8 +29,8 @@ FEW = ("rrrrr_m1", "quattro", "uranesx")
 def real(name: str) -> tuple[Mechanism, set[str]]:
     """A robot in normal form and the links of its default observations."""
     mechanism = normal_form(load(name)).mechanism
-    anatomy = decompose(mechanism)
-    return mechanism, {default_observation(anatomy, leg).link for leg in anatomy.legs}
+    decomposition = decompose(mechanism)
+    return mechanism, {default_observation(decomposition, leg).link for leg in decomposition.legs}
 
 
 def driven(mechanism: Mechanism) -> set[str]:
@@ -99,7 +99,7 @@ def assert_free(found: Layout) -> None:
 
 
 @pytest.mark.some(33)
-@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("name", list_robots())
 def test_every_joint_of_a_robot_stands_once_and_motors_are_marked(name: str) -> None:
     mechanism, observed = real(name)
     assert_whole(robot_svg(mechanism, observed=observed), mechanism, observed, set())
@@ -108,7 +108,9 @@ def test_every_joint_of_a_robot_stands_once_and_motors_are_marked(name: str) -> 
 
 @pytest.mark.some(2, 16)
 @pytest.mark.parametrize("form", ["simplified", "general"])
-@pytest.mark.parametrize("name", [*FEW, *(pytest.param(n, marks=pytest.mark.slow) for n in shipped() if n not in FEW)])
+@pytest.mark.parametrize(
+    "name", [*FEW, *(pytest.param(n, marks=pytest.mark.slow) for n in list_robots() if n not in FEW)]
+)
 def test_virtual_actuators_of_hidden_robots_are_coloured(name: str, form: str) -> None:
     hidden = derive(load(name), form=form).hidden
     if hidden is None:
@@ -138,8 +140,8 @@ def test_a_leg_alone_holds_its_own_joints(name: str) -> None:
 @pytest.mark.parametrize("name", ["quattro", "gough_stewart", "orthoglide"])
 def test_legs_are_rows_from_the_base_to_the_platform(name: str) -> None:
     mechanism, _ = real(name)
-    anatomy, found = decompose(mechanism), plan(mechanism)
-    assert sorted(row.label for row in found.rows if row.label) == sorted(anatomy.labels)
+    decomposition, found = decompose(mechanism), plan(mechanism)
+    assert sorted(row.label for row in found.rows if row.label) == sorted(decomposition.labels)
     for net in found.nets:
         if net.link == mechanism.base:
             assert net.bar is not None
@@ -147,7 +149,7 @@ def test_legs_are_rows_from_the_base_to_the_platform(name: str) -> None:
     for number, row in enumerate(found.rows):
         boxes = [spot.box for spot in found.spots if spot.row == number]
         own = {name for box in boxes for name in box.joints}
-        assert row.label is None or own == set(anatomy.leg(row.label).joints)
+        assert row.label is None or own == set(decomposition.leg(row.label).joints)
         assert all(row.start < spot.x < row.end for spot in found.spots if spot.row == number)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hrsynth import load, save, view
-from hrsynth.description import shipped
+from hrsynth.description import list_robots
 from hrsynth.present.view.view import View
 
 ROBOT = "3rrr_m1"
@@ -21,7 +21,7 @@ BOX = (
 
 def with_visuals(folder: Path, hidden: bool = False, **visuals: str) -> View:
     """A shipped robot with visuals on some of its links."""
-    text = shipped()[ROBOT].read_text()
+    text = list_robots()[ROBOT].read_text()
     for link, visual in visuals.items():
         assert f'<link name="{link}"/>' in text
         text = text.replace(f'<link name="{link}"/>', f'<link name="{link}">{visual}</link>')
@@ -46,7 +46,7 @@ def rods(found: View, link: str) -> int:
 def test_solids_stand_for_the_rods_of_their_links(tmp_path: Path):
     found = with_visuals(tmp_path, hidden=True, platform=BOX)
     (points,) = meshed(found, "platform")
-    X = found.setting.mechanism.links["platform"].pose
+    X = found.setup.mechanism.links["platform"].pose
     middle = X[:3, :3] @ [0.1, 0, 0.05] + X[:3, 3]
     assert points.mean(axis=0) == pytest.approx(middle)
     assert np.ptp((points - X[:3, 3]) @ X[:3, :3], axis=0) == pytest.approx(SIZE[[1, 0, 2]])
@@ -54,7 +54,7 @@ def test_solids_stand_for_the_rods_of_their_links(tmp_path: Path):
     assert rods(found, "prox_1") == 1
     assert [shape.role for shape in found.machines[1].shapes if shape.kind == "mesh"] == ["platform"]
     joints = {shape.joint for shape in found.machines[0].shapes if shape.joint}
-    assert joints == set(found.setting.mechanism.joints)
+    assert joints == set(found.setup.mechanism.joints)
 
 
 @pytest.mark.parametrize(
@@ -72,7 +72,7 @@ def test_mesh_files_beside_the_robot_are_read(tmp_path: Path, address: str):
     (tmp_path / "none.stl").write_bytes(b"no mesh")
     found = with_visuals(tmp_path, prox_1=mesh(address.format(folder=tmp_path), "2 2 2"), prox_2=mesh("none.stl"))
     (points,) = meshed(found, "prox_1")
-    X = found.setting.mechanism.links["prox_1"].pose
+    X = found.setup.mechanism.links["prox_1"].pose
     assert np.ptp((points - X[:3, 3]) @ X[:3, :3], axis=0) == pytest.approx(2 * SIZE, rel=1e-5)
     (note,) = (note for note in found.notes if "visual" in note)
     assert "cannot be read (prox_2" in note
@@ -144,7 +144,7 @@ def test_links_that_a_merged_joint_swallows_are_told(tmp_path: Path):
         f'<robot name="head">{links}{hinges}<hrsynth serial="true"><platform link="hand"/></hrsynth></robot>'
     )
     found = view(load(file))
-    assert "yoke" not in found.setting.mechanism.links
+    assert "yoke" not in found.setup.mechanism.links
     assert [note for note in found.notes if "merged" in note] == ["links inside merged joints are not drawn: yoke"]
     assert len(meshed(found, "hand")) == 1
 

@@ -64,7 +64,7 @@ def test_the_page_of_a_robot_shows_it_and_its_sliders_move_it(name: str, tab: Ta
     assert 0.03 < filled(home) < 0.6
     assert filled(home[:40]) + filled(home[-40:]) < 0.15, "the robot fits the picture"
     sliders = tab.page.locator("aside input[type=range]")
-    assert sliders.count() == seen(name).setting.dof
+    assert sliders.count() == seen(name).setup.dof
     before = home
     for number in range(sliders.count()):
         push(tab, number, "ArrowLeft")
@@ -151,8 +151,8 @@ def test_a_name_cannot_break_the_page():
     from dataclasses import replace
 
     found = seen("rrrrr_m1")
-    robot = replace(found.setting.robot, name="</script><b>&")
-    text = page.page(replace(found, setting=replace(found.setting, robot=robot), notes=("</script><b>",)))
+    robot = replace(found.setup.robot, name="</script><b>&")
+    text = page.page(replace(found, setup=replace(found.setup, robot=robot), notes=("</script><b>",)))
     assert "</script><b>" not in text
     assert text.count("</script>") == 3
 

@@ -14,9 +14,9 @@ from matplotlib.text import Text
 
 import hrsynth
 from hrsynth.families.__main__ import main
-from hrsynth.present import paper as papers
+from hrsynth.present import figure_format as papers
+from hrsynth.present.figure_format import Paper, paper_for, scale_figure
 from hrsynth.present.outputs import OUTPUTS
-from hrsynth.present.paper import Paper, paper_for, scale_figure
 from hrsynth.present.plots import empty_figure
 from hrsynth.present.sketch import Sketch
 from hrsynth.results import Result
@@ -45,7 +45,7 @@ QUESTIONS: dict[str, Callable[[str], Any]] = {
     "accuracy of a box": lambda _: hrsynth.accuracy(
         "quattro", "1,4", cone="0.1deg", grid="x=-0.3:0.3:5,y=-0.3:0.3:5,z=-0.8:-0.6:3,phi=0"
     ),
-    "singular": lambda _: hrsynth.singular("3rrr_m1"),
+    "singularities": lambda _: hrsynth.singularities("3rrr_m1"),
     "modes in the plane": lambda _: hrsynth.modes("3rrr_m1"),
     "modes in space": lambda _: hrsynth.modes("hexa", "1,3,5"),
     "servo in the plane": lambda _: hrsynth.servo(
@@ -54,12 +54,12 @@ QUESTIONS: dict[str, Callable[[str], Any]] = {
     "servo in space": lambda _: hrsynth.servo(
         "quattro", "1,4", start="x=0,y=0,z=-0.75,phi=0", goal="x=-0.2,y=0,z=-0.56,phi=0"
     ),
-    "endings in the plane": lambda _: hrsynth.endings("prrrp_m1", at="mode:1"),
+    "equilibria in the plane": lambda _: hrsynth.equilibria("prrrp_m1", at="mode:1"),
     "basins of a plane": lambda _: hrsynth.basins(
         "3rpr_m1", to="x=0,y=0,phi=0", grid="x=0:0.3:6,y=0:0.3:7,phi=0", jobs=1
     ),
-    "atlas": lambda _: hrsynth.atlas("quattro", "1,4"),
-    "atlas with its section": lambda folder: hrsynth.atlas(six_poses(folder)),
+    "aspects": lambda _: hrsynth.aspects("quattro", "1,4"),
+    "aspects with its section": lambda folder: hrsynth.aspects(six_poses(folder)),
 }
 ASKED = (("88mm", None), ("130mm", "10pt"), ("180mm", None), ("300mm", "9pt"))
 

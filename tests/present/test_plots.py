@@ -14,7 +14,7 @@ from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import load
 from hrsynth.mechanism.pose import Pose
 from hrsynth.present import maps, palette, plots
-from hrsynth.present.paper import PNG, print_figure, settle
+from hrsynth.present.figure_format import PNG, print_figure, settle
 from hrsynth.present.plots import MapPlane, round_ticks, tick_words
 from hrsynth.present.view.view import plane_normal
 from strategies import random_rotation, transformed
@@ -37,7 +37,7 @@ def test_ticks_are_round_inside_the_scale_and_neither_few_nor_many(seed: int):
 
 
 def test_every_function_that_makes_a_figure_draws_in_the_one_style():
-    for file in {*PRESENT.glob("*.py")} - {PRESENT / "plots.py", PRESENT / "paper.py"}:
+    for file in {*PRESENT.glob("*.py")} - {PRESENT / "plots.py", PRESENT / "figure_format.py"}:
         tree = ast.parse(file.read_text(encoding="utf-8"))
         assert "rcParams" not in file.read_text(encoding="utf-8"), file.name
         for node in tree.body:

@@ -9,13 +9,13 @@ import pytest
 from lxml import etree
 
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.description import load, shipped
+from hrsynth.description import list_robots, load
 from hrsynth.present.portrait import Portrait
 from hrsynth.present.view.shapes import MOTOR, PLATFORM
 
 
 @pytest.mark.some(17)
-@pytest.mark.parametrize("name", sorted(shipped()))
+@pytest.mark.parametrize("name", sorted(list_robots()))
 def test_a_portrait_holds_the_robot_and_nothing_beyond_its_frame(name: str):
     robot = load(name)
     drawn = Portrait.of(ObservedRobot.of(robot))

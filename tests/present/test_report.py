@@ -18,7 +18,7 @@ from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.derive import Derivation, derive
 from hrsynth.cli import execute
 from hrsynth.description import load
-from hrsynth.errors import BadRequest, PlaneNotMet
+from hrsynth.errors import BadRequest, NoReachablePose
 from hrsynth.families.formations import formation
 from hrsynth.present import palette
 from hrsynth.present.drawings import svg
@@ -117,11 +117,11 @@ def test_what_the_program_says_is_on_the_page(name: str, legs: str | None):
     found, page = made(name, legs)
     words = text_of(read(page))
     assert found.verdict.verdict in words
-    assert f"{found.certificate.largest_angle:.1e}" in words
+    assert f"{found.equivalence.largest_angle:.1e}" in words
     assert found.architecture.unicode.replace("\u0332", "") in words
     if found.hidden_architecture is not None:
         assert found.hidden_architecture.unicode.replace("\u0332", "") in words
-    for freedom in found.verdict.lost:
+    for freedom in found.verdict.unobserved:
         assert freedom.name in words
 
 
@@ -140,10 +140,10 @@ def test_picture_and_plain_answer_come_first_and_the_derivation_is_folded(name: 
 
 def test_sets_that_show_all_alike_are_one_row():
     found = derive(load("gough_stewart"))
-    rows = list(set_rows(legs(found.setting), 63))
+    rows = list(set_rows(legs(found.setup), 63))
     assert sum(len(sets) for sets, *_ in rows) == 63
-    assert [len(sets) for sets, each, _, _ in rows if not each.lost] == [20, 15, 6, 1]
-    assert all(len(sets) == 1 for sets, each, _, _ in rows if each.lost)
+    assert [len(sets) for sets, each, _, _ in rows if not each.unobserved] == [20, 15, 6, 1]
+    assert all(len(sets) == 1 for sets, each, _, _ in rows if each.unobserved)
 
 
 @pytest.mark.slow
@@ -152,7 +152,7 @@ def test_sets_that_see_less_at_zero_are_told_in_their_row():
     told = legs("rrrrr_m1", at="x=0,y=0.3332050807568877")
     fewer = [each for each in told.sets if each.rank_at_zero is not None]
     assert fewer
-    page = read(report(derive(told.setting)))
+    page = read(report(derive(told.setup)))
     cells = [text_of(row[2]) for row in page.findall(".//table[@class='sets']/tbody/tr")]
     assert sorted({cell for cell in cells if "at the zero" in cell}) == sorted(
         {f"{each.rank} of {each.dof} ({each.rank_at_zero} at the zero configuration)" for each in fewer}
@@ -171,7 +171,7 @@ def test_what_is_refused_is_one_sentence():
 
 def test_a_part_that_fails_leaves_its_reason():
     def fails() -> None:
-        raise PlaneNotMet("r", "the plane z=1", "too high")
+        raise NoReachablePose("r", "the plane z=1", "too high")
 
     assert parts.ask("r", fails) == parts.Refused("no pose of the plane z=1 is reached: too high")
     with pytest.raises(ZeroDivisionError):
@@ -356,7 +356,7 @@ def test_a_page_that_cannot_be_written_is_refused_at_once(
 def test_accuracy_is_about_directions_that_see_everything():
     found = made(*FAST)[0]
     with pytest.raises(BadRequest, match="infinite"):
-        parts.error_plane(found.setting, 0)
+        parts.error_plane(found.setup, 0)
 
 
 @pytest.mark.long

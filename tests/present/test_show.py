@@ -15,8 +15,8 @@ import pytest
 import hrsynth
 from hrsynth import load
 from hrsynth.cli import app, execute
+from hrsynth.cli.analyses import FIGURE, QUESTIONS
 from hrsynth.cli.options import JSON, SOURCE
-from hrsynth.cli.questions import FIGURE, QUESTIONS
 from hrsynth.errors import BadRequest
 from hrsynth.present.outputs import OUTPUTS, function, outputs_of
 from hrsynth.results import Result
@@ -27,7 +27,7 @@ ASKED = {
     "derive": (lambda robot: hrsynth.derive(robot), []),
     "legs": (lambda robot: hrsynth.legs(robot), []),
     "check": (lambda robot: hrsynth.check(robot, at=[GOAL]), ["--at", GOAL]),
-    "singular": (lambda robot: hrsynth.singular(robot, points=50), ["--points", "50"]),
+    "singularities": (lambda robot: hrsynth.singularities(robot, points=50), ["--points", "50"]),
     "advise": (lambda robot: hrsynth.advise(robot), []),
     "branch": (lambda robot: hrsynth.branch(robot, BOX), ["--box", BOX]),
     "modes": (lambda robot: hrsynth.modes(robot, at=GOAL), ["--at", GOAL]),
@@ -109,12 +109,12 @@ def test_a_result_is_one_line_at_a_prompt_and_marked_up_in_a_notebook(command: s
 def test_parts_of_results_and_robots_are_shown_too():
     robot = load("quattro")
     found = hrsynth.derive(robot, observe=["1", "4"])
-    for each, words in [(robot, "leg 4"), (found.certificate, "passed at 20"), (found.verdict, "rank 4 of 4")]:
+    for each, words in [(robot, "leg 4"), (found.equivalence, "passed at 20"), (found.verdict, "rank 4 of 4")]:
         assert words in str(each)
         assert "\n" not in repr(each)
         assert words in each._repr_html_()
-    assert "\n" not in repr(found.setting)
-    assert str(found.certificate) in " ".join(str(found).split())
+    assert "\n" not in repr(found.setup)
+    assert str(found.equivalence) in " ".join(str(found).split())
 
 
 @pytest.mark.some(1)
@@ -134,9 +134,9 @@ def test_a_derivation_holds_the_directions_at_the_pose_it_is_given():
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize("command", ["modes", "servo", pytest.param("singular", marks=pytest.mark.long)])
+@pytest.mark.parametrize("command", ["modes", "servo", pytest.param("singularities", marks=pytest.mark.long)])
 def test_pictures_of_results_are_shown_in_notebooks_and_saved(command: str, tmp_path):
-    options = {"steps": 9} if command == "singular" else {}
+    options = {"steps": 9} if command == "singularities" else {}
     picture = hrsynth.draw(answer(command), **options)
     assert picture._repr_png_().startswith(b"\x89PNG")
     picture.save(tmp_path / "p.png")

@@ -215,7 +215,7 @@ def test_a_platform_that_is_dragged_tells_places_within_its_freedoms(open_page):
     tab, found = open_page("3rrr_m1"), seen("3rrr_m1")
     ask(tab, "stage.ghosts([]); window.places = []; stage.gizmo(true, null, (place) => places.push(place))")
     rest(tab)
-    mechanism = found.setting.mechanism
+    mechanism = found.setup.mechanism
     centre, L = mechanism.links[mechanism.platform].pose[:3, 3], mechanism.length
     step = 0.1 * L
     assert ask(tab, "stage.handles.parts[0].proxy.position.toArray()") == pytest.approx(centre, abs=1e-6)
@@ -239,7 +239,7 @@ def test_a_platform_that_is_dragged_tells_places_within_its_freedoms(open_page):
 
 def test_a_ring_turns_the_platform_about_its_point(open_page):
     tab, found = open_page("3rrr_m1"), seen("3rrr_m1")
-    mechanism = found.setting.mechanism
+    mechanism = found.setup.mechanism
     centre = mechanism.links[mechanism.platform].pose[:3, 3]
     place = np.array(
         ask(

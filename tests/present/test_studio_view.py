@@ -32,7 +32,7 @@ def told(page: Page, kind: str, **fields: Any) -> dict[str, Any]:
 
 
 def law_closed(found: View, state: dict) -> None:
-    mechanism = found.setting.mechanism
+    mechanism = found.setup.mechanism
     places = dict(zip(mechanism.links, np.array(state["real"]), strict=True))
     assert (
         max(
@@ -47,7 +47,7 @@ def law_closed(found: View, state: dict) -> None:
 @pytest.mark.parametrize("name", [FIVE_BAR, "quattro"])
 def test_several_coordinates_at_once_with_closed_loops(name: str):
     found = seen(name)
-    mechanism = found.setting.mechanism
+    mechanism = found.setup.mechanism
     with serving(found) as server, opened(server) as page:
         assert (page.start["panels"], page.start["hidden"]) == (False, True)
         scene = told(page, "open")
@@ -74,8 +74,8 @@ def test_several_coordinates_at_once_with_closed_loops(name: str):
 
 def test_a_robot_of_no_file_is_served_and_turns_by_the_angle_that_its_slider_shows():
     found = view(planar(["RPR"] * 3, np.random.default_rng(1), [{1}] * 3))
-    link = list(found.setting.mechanism.links).index(found.setting.mechanism.platform)
-    normal = found.setting.motion.normal
+    link = list(found.setup.mechanism.links).index(found.setup.mechanism.platform)
+    normal = found.setup.motion.normal
     with serving(found) as server, opened(server) as page:
         scene = told(page, "open")
         slider = scene["sliders"][2]

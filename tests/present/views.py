@@ -35,7 +35,7 @@ def serving(found: View) -> Iterator[StudioServer]:
 def mechanism_of(found: View, machine: Machine) -> Mechanism:
     """The mechanism that a machine draws."""
     if machine.key == "real":
-        return found.setting.mechanism
+        return found.setup.mechanism
     assert found.derivation is not None
     assert found.derivation.hidden is not None
     return found.derivation.hidden

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.kinematics.certificate import Certificate, certify
+from hrsynth.kinematics.equivalence import EquivalenceCheck, check_equivalence
 from hrsynth.mechanism.model import Mechanism
 from hrsynth.rewrite.evidence import Evidence
 from hrsynth.rewrite.rule import Rule
@@ -63,10 +63,10 @@ class Recorder:
 
     setting: ObservedRobot
     passed: list[Mechanism] = field(default_factory=list)
-    refused: list[tuple[Mechanism, Certificate]] = field(default_factory=list)
+    refused: list[tuple[Mechanism, EquivalenceCheck]] = field(default_factory=list)
 
-    def __call__(self, mechanism: Mechanism, bodies: tuple[str, ...]) -> Certificate:
-        found = certify(self.setting.samples, mechanism, count=3, bodies=bodies, complete=False)
+    def __call__(self, mechanism: Mechanism, bodies: tuple[str, ...]) -> EquivalenceCheck:
+        found = check_equivalence(self.setting.samples, mechanism, count=3, bodies=bodies, complete=False)
         if found.passed:
             self.passed.append(mechanism)
         else:
@@ -74,28 +74,28 @@ class Recorder:
         return found
 
 
-def rewritten(setting: ObservedRobot, form: str = "simplified") -> tuple[Rewriting, Recorder]:
-    recorder = Recorder(setting)
-    evidence = Evidence(setting.anatomy, setting.samples)
+def rewritten(setup: ObservedRobot, form: str = "simplified") -> tuple[Rewriting, Recorder]:
+    recorder = Recorder(setup)
+    evidence = Evidence(setup.decomposition, setup.samples)
     return FORMS[form](Rewriting.of(evidence, recorder)), recorder
 
 
-def obeys(setting: ObservedRobot, form: str = "simplified", thorough: bool = False) -> Rewriting:
+def obeys(setup: ObservedRobot, form: str = "simplified", thorough: bool = False) -> Rewriting:
     """The law, for one robot: every step that passed, or (not ``thorough``) at most six of them, last ones included."""
-    result, recorder = rewritten(setting, form)
-    samples = setting.samples
-    question, length = samples.question, samples.twin.length
-    real = Oracle(setting.mechanism)
+    result, recorder = rewritten(setup, form)
+    samples = setup.samples
+    observation_model, length = samples.observation_model, samples.model.length
+    real = Oracle(setup.mechanism)
     found = recorder.passed
     if not thorough and len(found) > 6:
         found = [found[int(k)] for k in np.unique(np.linspace(0, len(found) - 1, 6).round())]
     for member in samples.members[: 3 if thorough else 1]:
-        state = state_of(samples.twin, member.configuration.q)
+        state = state_of(samples.model, member.configuration.q)
         assert real.error(state) < 1e-9
-        ours = seen_by_oracle(real, state, question, length)
+        ours = seen_by_oracle(real, state, observation_model, length)
         for mechanism in found:
-            oracle, reached = led(mechanism, question, member.way)
-            assert same_relation(ours, seen_by_oracle(oracle, reached, question, length)) < SAME_RELATION
+            oracle, reached = led(mechanism, observation_model, member.way)
+            assert same_relation(ours, seen_by_oracle(oracle, reached, observation_model, length)) < SAME_RELATION
     accepted = [step for step in result.steps if step.accepted]
     assert accepted[0].rule == "motors off"
     assert all(step.reason for step in result.steps)
@@ -159,12 +159,12 @@ def test_no_accepted_step_changes_the_relation_seen_from_a_moving_link(robot: st
     ids=name,
 )
 def test_the_general_form_keeps_all_legs(robot: str, legs: tuple[str, ...] | None) -> None:
-    setting = setting_of(robot, legs, None, 3)
-    result = obeys(setting, "general")
+    setup = setting_of(robot, legs, None, 3)
+    result = obeys(setup, "general")
     state = result.state
     assert state.removed == ()
-    assert tuple(leg.label for leg in state.anatomy().legs) == setting.anatomy.labels
-    assert setting.mechanism.links.keys() <= state.mechanism.links.keys()
+    assert tuple(leg.label for leg in state.decomposition().legs) == setup.decomposition.labels
+    assert setup.mechanism.links.keys() <= state.mechanism.links.keys()
     assert not any(step.rule in ("pi form", "leg removal", "end change") for step in result.steps)
     if robot in ("delta", "quattro", "3rrr_m1", "hexa"):
         assert "{R-PP}" in state.architecture().ascii

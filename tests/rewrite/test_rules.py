@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.kinematics.certificate import certify
+from hrsynth.kinematics.equivalence import check_equivalence
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import JointType, Mechanism, Motor
 from hrsynth.rewrite.evidence import Evidence, far_from, locus
 from hrsynth.rewrite.rule import Proposal, Refusal
-from hrsynth.rewrite.rules import end_change, leg_removal, lift, motors_off, pi_form, rules, takeover
+from hrsynth.rewrite.rules import end_change, joint_substitution, leg_removal, lift, motors_off, pi_form, rules
 from hrsynth.rewrite.state import State
-from hrsynth.rewrite.strategy import GENERAL, SIMPLIFIED, Rewriting, trusting
+from hrsynth.rewrite.strategy import GENERAL, SIMPLIFIED, Rewriting, apply_unchecked
 from kinematics.robots import derived, led, seen_by_oracle, setting_of, state_of
 from oracle import NotAssembled, Oracle, Undecided, logarithm, same_relation
 from strategies import deltas, random_direction, random_rotation
@@ -24,60 +24,60 @@ from strategies import deltas, random_direction, random_rotation
 DIFFERENT = 1e-4
 
 
-def oracle_angle(setting: ObservedRobot, mechanism: Mechanism) -> float:
+def oracle_angle(setup: ObservedRobot, mechanism: Mechanism) -> float:
     """The largest angle between the relations of the real robot and a rewritten one over the samples, by the oracle;
     pi/2 where it cannot follow."""
-    samples = setting.samples
-    real, angle = Oracle(setting.mechanism), 0.0
+    samples = setup.samples
+    real, angle = Oracle(setup.mechanism), 0.0
     for member in samples.members:
         ours = seen_by_oracle(
-            real, state_of(samples.twin, member.configuration.q), samples.question, samples.twin.length
+            real, state_of(samples.model, member.configuration.q), samples.observation_model, samples.model.length
         )
         try:
-            oracle, state = led(mechanism, samples.question, member.way)
-            theirs = seen_by_oracle(oracle, state, samples.question, samples.twin.length)
+            oracle, state = led(mechanism, samples.observation_model, member.way)
+            theirs = seen_by_oracle(oracle, state, samples.observation_model, samples.model.length)
         except (NotAssembled, Undecided):
             return float(np.pi / 2)
         angle = max(angle, same_relation(ours, theirs))
     return angle
 
 
-def is_wrong(setting: ObservedRobot, mechanism: Mechanism, bodies: tuple[str, ...] = ()) -> None:
+def is_wrong(setup: ObservedRobot, mechanism: Mechanism, bodies: tuple[str, ...] = ()) -> None:
     """The certificate refuses it, and the oracle sees the difference."""
-    certificate = certify(setting.samples, mechanism, bodies=bodies, complete=False)
+    certificate = check_equivalence(setup.samples, mechanism, bodies=bodies, complete=False)
     assert not certificate.passed
     assert certificate.reason
-    assert oracle_angle(setting, mechanism) > DIFFERENT
+    assert oracle_angle(setup, mechanism) > DIFFERENT
 
 
-def is_right(setting: ObservedRobot, mechanism: Mechanism) -> None:
-    certificate = certify(setting.samples, mechanism, complete=False)
+def is_right(setup: ObservedRobot, mechanism: Mechanism) -> None:
+    certificate = check_equivalence(setup.samples, mechanism, complete=False)
     assert certificate.passed, certificate.reason
-    assert oracle_angle(setting, mechanism) < 1e-6
+    assert oracle_angle(setup, mechanism) < 1e-6
 
 
-def evidence_of(setting: ObservedRobot) -> Evidence:
-    return Evidence(setting.anatomy, setting.samples)
+def evidence_of(setup: ObservedRobot) -> Evidence:
+    return Evidence(setup.decomposition, setup.samples)
 
 
-def simplified(setting: ObservedRobot) -> Rewriting:
+def simplified(setup: ObservedRobot) -> Rewriting:
     def check(mechanism: Mechanism, bodies: tuple[str, ...]) -> object:
-        return certify(setting.samples, mechanism, bodies=bodies, complete=False)
+        return check_equivalence(setup.samples, mechanism, bodies=bodies, complete=False)
 
-    return SIMPLIFIED(Rewriting.of(evidence_of(setting), check))  # type: ignore[arg-type]
+    return SIMPLIFIED(Rewriting.of(evidence_of(setup), check))  # type: ignore[arg-type]
 
 
 def proposals(found: Iterable[Proposal | Refusal]) -> tuple[list[Proposal], list[Refusal]]:
-    everything = list(found)
-    return ([p for p in everything if isinstance(p, Proposal)], [r for r in everything if isinstance(r, Refusal)])
+    all_samples = list(found)
+    return ([p for p in all_samples if isinstance(p, Proposal)], [r for r in all_samples if isinstance(r, Refusal)])
 
 
-def lifted(setting: ObservedRobot) -> State:
+def lifted(setup: ObservedRobot) -> State:
     """The exact lift of all observed legs, motors off."""
-    evidence = evidence_of(setting)
-    state = State(setting.anatomy, replace(setting.anatomy.mechanism, observations=()))
+    evidence = evidence_of(setup)
+    state = State(setup.decomposition, replace(setup.decomposition.mechanism, observations=()))
     state = proposals(motors_off.RULE.proposals(state, evidence))[0][0].state
-    for leg in dict.fromkeys(o.leg for o in setting.observed):
+    for leg in dict.fromkeys(o.leg for o in setup.observed):
         state = proposals(lift.RULE.proposals(state, evidence, leg))[0][0].state
     return state
 
@@ -121,14 +121,14 @@ def skew(legs: int, rng: np.random.Generator, pods: int = 0) -> Mechanism:
 @pytest.mark.parametrize(("legs", "pods", "seed"), [(3, 0, 1), (3, 0, 2), (1, 5, 3), (2, 3, 4)])
 def test_takeover_of_a_skew_elbow_is_caught(legs: int, pods: int, seed: int) -> None:
     """An R that is skew to the base R cannot give way to U: done without its side condition it changes the relation."""
-    setting = ObservedRobot.of(skew(legs, np.random.default_rng(seed), pods), samples=3)
-    state, evidence = lifted(setting), evidence_of(setting)
-    offered, refused = proposals(takeover.RULE.proposals(state, evidence, "1"))
+    setup = ObservedRobot.of(skew(legs, np.random.default_rng(seed), pods), samples=3)
+    state, evidence = lifted(setup), evidence_of(setup)
+    offered, refused = proposals(joint_substitution.RULE.proposals(state, evidence, "1"))
     assert offered == []
     assert "cannot turn about its own direction" in refused[0].reason
-    forced, _ = proposals(takeover.RULE.proposals(state, evidence, "1", waive=True))
-    is_wrong(setting, forced[0].state.mechanism)
-    is_right(setting, state.mechanism)
+    forced, _ = proposals(joint_substitution.RULE.proposals(state, evidence, "1", waive=True))
+    is_wrong(setup, forced[0].state.mechanism)
+    is_right(setup, state.mechanism)
 
 
 @pytest.mark.some(1)
@@ -137,9 +137,9 @@ def test_takeover_of_a_skew_elbow_is_caught(legs: int, pods: int, seed: int) -> 
     [(3, 0, 1, "3-{RR|Pi-U*R}-S"), (1, 5, 3, "{RR|Pi-U*R}-S"), (2, 3, 4, "2-{RR|Pi-U*R}-S")],
 )
 def test_legs_with_skew_axes_keep_their_joint(legs: int, pods: int, seed: int, word: str) -> None:
-    setting = ObservedRobot.of(skew(legs, np.random.default_rng(seed), pods), samples=3)
-    result = simplified(setting)
-    is_right(setting, result.state.mechanism)
+    setup = ObservedRobot.of(skew(legs, np.random.default_rng(seed), pods), samples=3)
+    result = simplified(setup)
+    is_right(setup, result.state.mechanism)
     assert word in result.state.architecture().ascii.split("+")
     refused = [s for s in result.steps if s.rule == "takeover" and not s.accepted and int(s.leg or 0) <= legs]
     assert len(refused) == legs
@@ -150,29 +150,29 @@ def test_legs_with_skew_axes_keep_their_joint(legs: int, pods: int, seed: int, w
 @pytest.mark.parametrize("observed", [("1", "2"), ("3",)])
 def test_removal_of_a_leg_that_holds_the_platform_is_caught(observed: tuple[str, ...]) -> None:
     """Each leg of 3-RPS takes one freedom from the platform."""
-    setting = setting_of("3rps", observed, None, 3)
-    result = simplified(setting)
+    setup = setting_of("3rps", observed, None, 3)
+    result = simplified(setup)
     assert result.state.removed == ()
     kept = {step.leg for step in result.steps if step.rule == "keep"}
-    assert kept == set(setting.anatomy.labels) - set(observed)
+    assert kept == set(setup.decomposition.labels) - set(observed)
     for leg in kept:
-        offered, _ = proposals(leg_removal.RULE.proposals(result.state, evidence_of(setting), leg or ""))
-        is_wrong(setting, offered[0].state.mechanism, offered[0].bodies)
+        offered, _ = proposals(leg_removal.RULE.proposals(result.state, evidence_of(setup), leg or ""))
+        is_wrong(setup, offered[0].state.mechanism, offered[0].bodies)
 
 
 def test_the_leg_with_the_camera_is_never_removed() -> None:
-    setting = setting_of("delta", ("1", "2"), "rod_3a", 3)
-    offered, refused = proposals(leg_removal.RULE.proposals(lifted(setting), evidence_of(setting), "3", waive=True))
+    setup = setting_of("delta", ("1", "2"), "rod_3a", 3)
+    offered, refused = proposals(leg_removal.RULE.proposals(lifted(setup), evidence_of(setup), "3", waive=True))
     assert offered == []
     assert "camera" in refused[0].reason
-    assert "rod_3a" in simplified(setting).state.mechanism.links
+    assert "rod_3a" in simplified(setup).state.mechanism.links
 
 
-def turned_carriers(setting: ObservedRobot, mechanism: Mechanism, state: State) -> float:
+def turned_carriers(setup: ObservedRobot, mechanism: Mechanism, state: State) -> float:
     """By how much (rad) the carriers of the virtual actuators turn on the way to the samples, by the oracle."""
     turns = []
-    for member in setting.samples.members:
-        oracle, reached = led(mechanism, setting.samples.question, member.way)
+    for member in setup.samples.members:
+        oracle, reached = led(mechanism, setup.samples.observation_model, member.way)
         for chain in state.chains:
             R = oracle.pose(reached, chain.carrier)[:3, :3] @ mechanism.links[chain.carrier].pose[:3, :3].T
             turns.append(float(np.linalg.norm(logarithm(R))))
@@ -183,21 +183,22 @@ def turned_carriers(setting: ObservedRobot, mechanism: Mechanism, state: State) 
 @pytest.mark.parametrize("robot", ["3rrr_m1", "delta", "3ruu", "quattro_rigid"])
 def test_a_parallelogram_with_a_wrong_offset_is_caught(robot: str) -> None:
     """One crank's foot 2 % off: the carrier turns with the arm, and the actuator's angle is not the direction's."""
-    setting = setting_of(robot, None, None, 3)
+    setup = setting_of(robot, None, None, 3)
     before = GENERAL(
         Rewriting.of(
-            evidence_of(setting), lambda m, bodies: certify(setting.samples, m, count=1, bodies=bodies, complete=False)
+            evidence_of(setup),
+            lambda m, bodies: check_equivalence(setup.samples, m, count=1, bodies=bodies, complete=False),
         )
     )
-    offered, _ = proposals(pi_form.RULE.proposals(before.state, evidence_of(setting), "1"))
+    offered, _ = proposals(pi_form.RULE.proposals(before.state, evidence_of(setup), "1"))
     state, right = offered[0].state, offered[0].state.mechanism
-    is_right(setting, right)
-    assert turned_carriers(setting, right, state) < 1e-9
+    is_right(setup, right)
+    assert turned_carriers(setup, right, state) < 1e-9
     joint = right.joints[next(n for n in right.joints if n.startswith("crank_base"))]
     for direction in np.linalg.svd(joint.axis[None])[2][1:]:
         wrong = right.changed(joints=[replace(joint, point=joint.point + 0.02 * right.length * direction)])
-        assert turned_carriers(setting, wrong, state) > 1e-4
-        certificate = certify(setting.samples, wrong, complete=False)
+        assert turned_carriers(setup, wrong, state) > 1e-4
+        certificate = check_equivalence(setup.samples, wrong, complete=False)
         assert not certificate.passed
         assert "parametrise" in certificate.reason
 
@@ -206,14 +207,14 @@ def test_a_parallelogram_with_a_wrong_offset_is_caught(robot: str) -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_trust_in_arms_that_turn_the_parallelogram_is_caught(seed: int) -> None:
     """Where the base R is not parallel to the short side, the companion rod does not stay beside the observed one."""
-    setting = ObservedRobot.of(deltas(["R"] * 3, ["2-SS"] * 3, np.random.default_rng(seed), False), samples=3)
-    evidence = evidence_of(setting)
-    trusted = trusting(evidence, change_ends=False)
+    setup = ObservedRobot.of(deltas(["R"] * 3, ["2-SS"] * 3, np.random.default_rng(seed), False), samples=3)
+    evidence = evidence_of(setup)
+    trusted = apply_unchecked(evidence, change_ends=False)
     assert len(trusted) == 1
     assert trusted[0].state.architecture().ascii == "3-Pi-{2-U*S}"
-    is_wrong(setting, trusted[0].state.mechanism)
-    result = simplified(setting)
-    is_right(setting, result.state.mechanism)
+    is_wrong(setup, trusted[0].state.mechanism)
+    result = simplified(setup)
+    is_right(setup, result.state.mechanism)
     refused = [step for step in result.steps if step.rule == "companion" and not step.accepted]
     assert {step.leg for step in refused} == {"1", "2", "3"}
     assert all("changes its direction" in step.reason for step in refused)
@@ -223,34 +224,34 @@ def test_trust_in_arms_that_turn_the_parallelogram_is_caught(seed: int) -> None:
 @pytest.mark.some(1)
 @pytest.mark.parametrize("seed", range(3))
 def test_trust_in_aligned_arms_is_justified(seed: int) -> None:
-    setting = ObservedRobot.of(deltas(["R"] * 3, ["2-SS"] * 3, np.random.default_rng(seed), True), samples=3)
-    trusted = trusting(evidence_of(setting), change_ends=False)
-    is_right(setting, trusted[0].state.mechanism)
-    result = simplified(setting)
+    setup = ObservedRobot.of(deltas(["R"] * 3, ["2-SS"] * 3, np.random.default_rng(seed), True), samples=3)
+    trusted = apply_unchecked(evidence_of(setup), change_ends=False)
+    is_right(setup, trusted[0].state.mechanism)
+    result = simplified(setup)
     assert result.state.architecture() == trusted[0].state.architecture()
     assert result.state.architecture().ascii == "3-Pi-{2-U*S}"
 
 
 def test_a_ball_made_universal_where_the_rod_spins_otherwise_is_caught() -> None:
     """Ends of a Gough-Stewart platform may not be changed: each takes a freedom away."""
-    setting = setting_of("gough_stewart", None, None, 3)
-    state = simplified(setting).state
-    offered, _ = proposals(end_change.RULE.proposals(state, evidence_of(setting), waive=True))
+    setup = setting_of("gough_stewart", None, None, 3)
+    state = simplified(setup).state
+    offered, _ = proposals(end_change.RULE.proposals(state, evidence_of(setup), waive=True))
     assert offered
     for proposal in offered:
-        is_wrong(setting, proposal.state.mechanism)
+        is_wrong(setup, proposal.state.mechanism)
 
 
 @pytest.mark.some(2)
 @pytest.mark.parametrize("robot", ["delta", "3rrr_m1", "gough_stewart"])
 def test_the_lift_has_virtual_motors_only(robot: str) -> None:
     """The lift has one motor a leg, a virtual one; every real motor is passive, and nothing is constrained."""
-    setting = setting_of(robot, None, None, 3)
-    state = lifted(setting)
+    setup = setting_of(robot, None, None, 3)
+    state = lifted(setup)
     driven = {n for n, joint in state.mechanism.joints.items() if joint.actuated}
     assert driven == {chain.actuator for chain in state.chains}
-    assert driven.isdisjoint(setting.mechanism.joints)
-    is_right(setting, state.mechanism)
+    assert driven.isdisjoint(setup.mechanism.joints)
+    is_right(setup, state.mechanism)
 
 
 # --- reasons and conditions --------------------------------------------------------------------------------------
@@ -258,22 +259,22 @@ def test_the_lift_has_virtual_motors_only(robot: str) -> None:
 
 @pytest.mark.parametrize("robot", ["3rrr_m1", "3prr_m1", "gough_stewart", "3upu", "delta", "hexaglide", "rprpr_m2"])
 def test_every_rule_gives_a_reason(robot: str) -> None:
-    setting = setting_of(robot, None, None, 3)
-    state, evidence = lifted(setting), evidence_of(setting)
+    setup = setting_of(robot, None, None, 3)
+    state, evidence = lifted(setup), evidence_of(setup)
     for rule in rules():
         assert rule.source
-        for leg in setting.anatomy.labels:
+        for leg in setup.decomposition.labels:
             for found in rule.proposals(state, evidence, leg):
                 assert len(found.reason) > 10, rule.name
 
 
 def test_a_rule_does_not_touch_the_state_it_is_given() -> None:
-    setting = setting_of("delta", None, None, 3)
-    state, evidence = lifted(setting), evidence_of(setting)
+    setup = setting_of("delta", None, None, 3)
+    state, evidence = lifted(setup), evidence_of(setup)
     before = (dict(state.mechanism.links), dict(state.mechanism.joints), state.chains, dict(state.owners))
     for rule in rules():
         if rule is not lift.RULE:
-            for leg in setting.anatomy.labels:
+            for leg in setup.decomposition.labels:
                 list(rule.proposals(state, evidence, leg))
     assert before == (dict(state.mechanism.links), dict(state.mechanism.joints), state.chains, dict(state.owners))
 
@@ -284,14 +285,14 @@ def test_sliding_joints_are_never_taken_over(robot: str) -> None:
     """PPR and PRP legs: a P before the observed link carries its direction, and stays."""
     derivation = derived(robot)
     assert derivation.hidden is not None
-    slides = {n for n, j in derivation.setting.mechanism.joints.items() if j.type is JointType.PRISMATIC}
+    slides = {n for n, j in derivation.setup.mechanism.joints.items() if j.type is JointType.PRISMATIC}
     assert slides
     assert slides <= derivation.hidden.joints.keys()
 
 
 def test_companions_are_the_other_rods() -> None:
-    setting = setting_of("delta", None, None, 3)
-    evidence = evidence_of(setting)
+    setup = setting_of("delta", None, None, 3)
+    evidence = evidence_of(setup)
     assert evidence.parallel_rods("rod_1a") == ("rod_1b",)
     assert evidence.parallel_rods("rod_1b") == ("rod_1a",)
     assert evidence.parallel_rods("arm_1") == ()
@@ -310,9 +311,9 @@ def test_companions_are_the_other_rods() -> None:
     ],
 )
 def test_the_part_before_the_observed_link(robot: str, joints: int, dimension: int, translates: bool) -> None:
-    setting = setting_of(robot, None, None, 3)
-    evidence = evidence_of(setting)
-    for chain in lifted(setting).chains:
+    setup = setting_of(robot, None, None, 3)
+    evidence = evidence_of(setup)
+    for chain in lifted(setup).chains:
         proximal = evidence.proximal(chain.link)
         assert proximal is not None
         assert len(proximal.joints) == joints
@@ -358,8 +359,8 @@ def test_far_from() -> None:
 
 def test_motors_are_counted_one_by_one() -> None:
     """A driven U has two motors; a robot may have none."""
-    setting = setting_of("3upu")
-    mechanism = setting.anatomy.mechanism
+    setup = setting_of("3upu")
+    mechanism = setup.decomposition.mechanism
     universal = next(joint for joint in mechanism.joints.values() if joint.type == JointType.UNIVERSAL)
     passive = [replace(joint, motor=None) for joint in mechanism.joints.values()]
     for joints, words in (
@@ -367,5 +368,5 @@ def test_motors_are_counted_one_by_one() -> None:
         (passive, "the robot has no motors"),
         ([*passive, replace(universal, motor=Motor("m"))], "2 real motors become passive"),
     ):
-        state = State(setting.anatomy, mechanism.changed(joints=joints))
-        assert [match.reason for match in motors_off.find(state, evidence_of(setting), "1")] == [words]
+        state = State(setup.decomposition, mechanism.changed(joints=joints))
+        assert [match.reason for match in motors_off.find(state, evidence_of(setup), "1")] == [words]

@@ -20,7 +20,7 @@ from scipy.optimize import brentq, least_squares
 
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.geometry.vectors import Array, hat, inverse, perpendicular, pose, rotation_about, unit
-from hrsynth.kinematics.locked import rezero
+from hrsynth.kinematics.locked_twists import rezero
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import JointType, Mechanism
@@ -448,9 +448,9 @@ def pod(rng: np.random.Generator, kind: str) -> Case:
     holds = [*reached(rng, own.random, 3), crossing(rng, own.drawn, own.at, own.planes)]
     observe = ("1", "2", "3")
     if kind == "pole":  # leg 1 along e₁, which only the lift says
-        setting = ObservedRobot.of(own.robot, observe, samples=3)
-        chain = lifted(setting).chains[0]
-        e = lifted(setting).mechanism.joints[chain.actuator].axis
+        setup = ObservedRobot.of(own.robot, observe, samples=3)
+        chain = lifted(setup).chains[0]
+        e = lifted(setup).mechanism.joints[chain.actuator].axis
         fails = own.at(own.pointing(rng, 1, e * np.sign(e @ chain.direction)))
     else:  # the removed leg 4 along the first axis of its U
         e = own.foot[4].axes[0]
@@ -489,8 +489,8 @@ def upu(rng: np.random.Generator) -> Case:
         )
         builder.observe(str(k), f"upper_{k}", u)
     special = builder.build(platform="platform")
-    twin = PinocchioModel(special)
-    robot = rezero(walked(twin, int(rng.integers(1 << 30)), 3, 0.15))
+    model = PinocchioModel(special)
+    robot = rezero(walked(model, int(rng.integers(1 << 30)), 3, 0.15))
     holds = []
     for seed in range(3):
         at = walked(PinocchioModel(robot), seed, 3, 0.1)
@@ -575,20 +575,20 @@ def null(matrix: Array) -> Array:
     return np.asarray(right[rank:].T)
 
 
-def seen(robot: Mechanism, state: Array, setting: ObservedRobot, chains: State | None = None) -> Seen:
+def seen(robot: Mechanism, state: Array, setup: ObservedRobot, chains: State | None = None) -> Seen:
     """Of the real robot, which its directions drive (``chains`` None), or of one that its virtual motors drive."""
-    oracle, question, length = Oracle(robot), setting.samples.question, setting.samples.twin.length
+    oracle, observation_model, length = Oracle(robot), setup.samples.observation_model, setup.samples.model.length
     assert oracle.error(state) < CLOSED
     kernel, gap = oracle.kernel(state)
     if gap < GAP:
         raise Undecided(gap)
     kernel = kernel / np.linalg.norm(kernel, axis=0)
-    t = oracle.twist(kernel, question.platform)
+    t = oracle.twist(kernel, observation_model.platform)
     rates = [
         -hat(oracle.pose(state, o.link)[:3, :3] @ o.direction) @ oracle.twist(kernel, o.link)[3:]
         if o.link in robot.links
         else np.zeros((3, kernel.shape[1]))
-        for o in question.observations
+        for o in observation_model.observations
         if isinstance(o, Direction)
     ]
     rows = np.vstack([t[:3] / length, t[3:], *rates])
@@ -610,17 +610,17 @@ def apart(one: Seen, other: Seen) -> float:
 # --- the conditions ---------------------------------------------------------------------------------------------------
 
 
-def full_loops(setting: ObservedRobot, hidden: State, at: Poses) -> bool:
+def full_loops(setup: ObservedRobot, hidden: State, at: Poses) -> bool:
     """Whether the real robot has the mobility that it has at its samples."""
-    real = setting.mechanism
-    return Oracle(real).mobility(np.array([at[n] for n in real.links])) == setting.mobility.total
+    real = setup.mechanism
+    return Oracle(real).mobility(np.array([at[n] for n in real.links])) == setup.mobility.total
 
 
-def out_of_plane(setting: ObservedRobot, hidden: State, at: Poses) -> bool:
+def out_of_plane(setup: ObservedRobot, hidden: State, at: Poses) -> bool:
     """Whether no u lies in the plane of the axes of its U̲, or along that of its R̲."""
-    state = dict(zip(hidden.mechanism.links, stand(hidden, setting.mechanism, at), strict=True))
+    state = dict(zip(hidden.mechanism.links, stand(hidden, setup.mechanism, at), strict=True))
     for chain in hidden.chains:
-        joint, real = hidden.mechanism.joints[chain.actuator], setting.mechanism.links[chain.link]
+        joint, real = hidden.mechanism.joints[chain.actuator], setup.mechanism.links[chain.link]
         u = at[chain.link][:3, :3] @ real.pose[:3, :3].T @ chain.direction
         axes = [joint.axes[0]]
         for axis in joint.axes[1:]:
@@ -631,10 +631,10 @@ def out_of_plane(setting: ObservedRobot, hidden: State, at: Poses) -> bool:
     return True
 
 
-def not_flat(setting: ObservedRobot, hidden: State, at: Poses) -> bool:
+def not_flat(setup: ObservedRobot, hidden: State, at: Poses) -> bool:
     """Whether in each new parallelogram the cranks are not along the line of their feet."""
     mechanism = hidden.mechanism
-    state = dict(zip(mechanism.links, stand(hidden, setting.mechanism, at), strict=True))
+    state = dict(zip(mechanism.links, stand(hidden, setup.mechanism, at), strict=True))
     for chain in hidden.chains:
         feet, crank = [], np.zeros(3)
         for joint in mechanism.joints_of(chain.carrier):
@@ -650,23 +650,23 @@ def not_flat(setting: ObservedRobot, hidden: State, at: Poses) -> bool:
     return True
 
 
-def spanned(setting: ObservedRobot, hidden: State, at: Poses) -> bool:
+def spanned(setup: ObservedRobot, hidden: State, at: Poses) -> bool:
     """Whether each removed leg, by itself, allows the platform all that the rest allows it."""
-    real, length = setting.mechanism, setting.samples.twin.length
+    real, length = setup.mechanism, setup.samples.model.length
     rest = Oracle(hidden.mechanism)
     state = stand(hidden, real, at)
     allowed = rest.twist(rest.kernel(state)[0], real.platform)
     for label in hidden.removed:
-        leg = setting.anatomy.leg(label)
+        leg = setup.decomposition.leg(label)
         part = Mechanism.of(
             "leg",
-            [real.links[n] for n in real.links if n in {*leg.links, real.base, leg.attach}],
+            [real.links[n] for n in real.links if n in {*leg.links, real.base, leg.platform_link}],
             [real.joints[n] for n in leg.joints],
             base=real.base,
-            platform=leg.attach,
+            platform=leg.platform_link,
         )
         alone = Oracle(part)
-        own = alone.twist(alone.kernel(np.array([at[n] for n in part.links]))[0], leg.attach)
+        own = alone.twist(alone.kernel(np.array([at[n] for n in part.links]))[0], leg.platform_link)
         scale = np.repeat([1 / length, 1.0], 3)[:, None]
         one, other = span(scale * own), span(scale * allowed)
         if np.linalg.norm(other - one @ (one.T @ other)) > SAME_RELATION:
@@ -713,10 +713,10 @@ def derived_case(kind: str, seed: int) -> tuple[Case, ObservedRobot, Rewriting]:
             case = make(rng)
         except NoCase:
             continue
-        setting = ObservedRobot.of(case.robot, case.observe, samples=3)
-        found = simplified(setting)
+        setup = ObservedRobot.of(case.robot, case.observe, samples=3)
+        found = simplified(setup)
         if any(step.rule == rule and step.accepted for step in found.steps):
-            return case, setting, found
+            return case, setup, found
     raise AssertionError("no robot of this kind")
 
 
@@ -725,22 +725,20 @@ def derived_case(kind: str, seed: int) -> tuple[Case, ObservedRobot, Rewriting]:
 def test_the_relation_is_kept_where_the_conditions_hold(kind: str, seed: int) -> None:
     """The lift is the real robot at each configuration but where u is along e₁, the simplified robot where all that
     its rules ask for holds; where a rule's condition fails, it differs."""
-    case, setting, found = derived_case(kind, seed)
-    real, lift, hidden = setting.mechanism, lifted(setting), found.state
+    case, setup, found = derived_case(kind, seed)
+    real, lift, hidden = setup.mechanism, lifted(setup), found.state
     asked = {each for step in found.steps if step.accepted for each in step.keeps}
 
     def at(poses: Poses) -> list[float]:
         """How far lift and simplified robot are from the real one."""
-        ours = seen(real, np.array([poses[name] for name in real.links]), setting)
-        return [
-            apart(ours, seen(other.mechanism, stand(other, real, poses), setting, other)) for other in (lift, hidden)
-        ]
+        ours = seen(real, np.array([poses[name] for name in real.links]), setup)
+        return [apart(ours, seen(other.mechanism, stand(other, real, poses), setup, other)) for other in (lift, hidden)]
 
     for poses in case.holds:
-        assert all(CONDITIONS[each](setting, hidden, poses) for each in asked)
+        assert all(CONDITIONS[each](setup, hidden, poses) for each in asked)
         assert max(at(poses)) < SAME_RELATION
     (rule,) = (each for each in rules() if each.name == KINDS[kind][0])
-    assert not all(CONDITIONS[each](setting, hidden, case.fails) for each in rule.keeps)
+    assert not all(CONDITIONS[each](setup, hidden, case.fails) for each in rule.keeps)
     one, other = at(case.fails)
     assert (one > DIFFERENT) if rule.name == "lift" else (one < SAME_RELATION)
     assert other > DIFFERENT

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import hrsynth
-from hrsynth.description import load, shipped
+from hrsynth.description import list_robots, load
 
 LIMIT = 0.05
 
@@ -18,7 +18,7 @@ def limited(tmp_path: Path) -> Path:
     """A 3-RRR whose first motor turns by so much either way."""
     path = tmp_path / "limited.urdf"
     path.write_text(
-        shipped()["3rrr_m1"]
+        list_robots()["3rrr_m1"]
         .read_text()
         .replace(
             '<joint name="shoulder_1" type="continuous">',
@@ -45,7 +45,7 @@ def test_poses_beyond_limits_are_named(limited: Path):
     beyond = [abs(crank(x)) > LIMIT for x in values]
     assert 0 < sum(beyond) < len(beyond)
     found = hrsynth.accuracy(limited, cone="0.1deg", at=[f"x={x},y=0,phi=0" for x in values])
-    assert [each.beyond for each in found.poses] == [("shoulder_1",) if far else () for far in beyond]
+    assert [each.beyond_limits for each in found.poses] == [("shoulder_1",) if far else () for far in beyond]
     assert "beyond those of shoulder_1" in str(found)
     checked = str(hrsynth.check(limited, grid="x=-0.04:0.04:9,y=0,phi=0"))
     assert f"{sum(beyond)} beyond limits of joints" in checked

@@ -13,25 +13,25 @@ import numpy as np
 import pytest
 
 from hrsynth.analysis.accuracy.accuracy import accuracy
-from hrsynth.analysis.accuracy.cones import Blur
+from hrsynth.analysis.accuracy.measurement_bounds import MeasurementBounds
 from hrsynth.analysis.aspects.path import path
 from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.modes.modes import modes
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.batch.reach import reach
+from hrsynth.batch.pose_continuation import reach
 from hrsynth.cli import execute
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PoseNotReached
 from hrsynth.geometry.vectors import pose, rotation_from_rpy
 from hrsynth.mechanism.pose import Pose
-from hrsynth.progress import following, tell
+from hrsynth.progress import on_progress, report
 from hrsynth.selection.loop_ends import LoopEnds, fewer_are_better
 from hrsynth.selection.select import Candidate, Criteria, Selection, _Work, select
 from hrsynth.selection.sight import CameraView, are_hidden, camera_at
 from hrsynth.simulation.camera import Camera, cylinders
-from hrsynth.simulation.endings.basins import basins
-from hrsynth.simulation.endings.endings import RestSearch
-from hrsynth.simulation.endings.radius import CertifiedRadius, certified_radius
+from hrsynth.simulation.equilibria.attraction_radius import CertifiedRadius, certified_radius
+from hrsynth.simulation.equilibria.basins import basins
+from hrsynth.simulation.equilibria.equilibria import EquilibriumSearch
 from hrsynth.tolerances import SAME_RELATION
 
 START, GOAL = "x=0,y=0,z=-0.75,phi=0", "x=-0.2,y=0,z=-0.56,phi=0"
@@ -52,11 +52,14 @@ def found() -> Selection:
 
 @cache
 def work() -> _Work:
-    setting = ObservedRobot.of(load("quattro"))
-    everything = setting.everything
-    ends = [reach(everything.start, everything.question, Pose.parse(text), setting.motion) for text in (START, GOAL)]
-    cones = Blur.of("0.1deg", None, setting.observed)
-    return _Work(setting, ends[0], ends[1], cones, None, Criteria(), math.inf, 0)
+    setup = ObservedRobot.of(load("quattro"))
+    all_samples = setup.all_samples
+    ends = [
+        reach(all_samples.start, all_samples.observation_model, Pose.parse(text), setup.motion)
+        for text in (START, GOAL)
+    ]
+    cones = MeasurementBounds.of("0.1deg", None, setup.observed)
+    return _Work(setup, ends[0], ends[1], cones, None, Criteria(), math.inf, 0)
 
 
 def first(watched: str) -> Candidate:
@@ -187,14 +190,14 @@ def test_what_is_not_examined_is_neither_kept_nor_discarded(examine: int, second
 
 def ends(others: tuple[str, ...] | None, length: float) -> LoopEnds:
     at = work().goal
-    radius = CertifiedRadius(at, work().setting.motion, length, None, 0.0, 0.0, 1, "not proved")
+    radius = CertifiedRadius(at, work().setup.motion, length, None, 0.0, 0.0, 1, "not proved")
     return LoopEnds(others, None if others is None else radius)
 
 
 def test_endings_rank_before_accuracy() -> None:
     """Fewer poses that attract, then a radius of a higher power of two; sets of which that is not known come last."""
     ranked = [ends((), 0.05), ends((), 0.01), ends((), 0.0), ends(("mode",), 0.05), ends(None, 0.0)]
-    ranks = [Candidate(("1",), "controllable", ends=each).rank for each in (*ranked, None)]
+    ranks = [Candidate(("1",), "controllable", equilibria=each).rank for each in (*ranked, None)]
     assert ranks == sorted(ranks)
     assert ranks[:5] == sorted(set(ranks))
     assert ranks[4] == ranks[5]
@@ -222,11 +225,11 @@ def test_four_legs_are_worse_than_two_where_runs_show_it() -> None:
     """At the goal of notebook 11 the sentence says why, and more of the starts below it come to it with two legs."""
     at, found, shares = "x=0,y=0,z=-0.5,phi=0.3", [], []
     for watched in (("2", "3"), ("1", "2", "3", "4")):
-        setting = ObservedRobot.of("quattro", watched)
-        goal = reach(setting.everything.start, setting.everything.question, Pose.parse(at), setting.motion)
-        found.append((watched, LoopEnds.of(setting, goal)))
+        setup = ObservedRobot.of("quattro", watched)
+        goal = reach(setup.all_samples.start, setup.all_samples.observation_model, Pose.parse(at), setup.motion)
+        found.append((watched, LoopEnds.of(setup, goal)))
         runs = basins("quattro", list(watched), to=at, grid="x=-0.4:0.4:5,y=-0.4:0.4:5,z=-0.6,phi=0.3", jobs=1)
-        shares.append(sum(end.share for end in runs.ends if end.ending.name == "goal"))
+        shares.append(sum(end.share for end in runs.ends if end.run_outcome.name == "goal"))
     assert shares[0] > 1.5 * shares[1] > 0
     said = str(fewer_are_better(found[0], found[1:]))
     assert said.startswith("fewer legs are better here: with 2, 3 the loop was found to be drawn to ")
@@ -237,21 +240,23 @@ def test_four_legs_are_worse_than_two_where_runs_show_it() -> None:
 def test_endings_are_those_of_the_single_questions() -> None:
     """The kinds of what attracts besides the goal, and the certified radius, of the set that is kept."""
     best = select("rrrrr_m1", start="x=0.05", goal="x=-0.01,y=0.03", runs=0).kept[0]
-    setting = ObservedRobot.of("rrrrr_m1", best.legs)
-    goal = reach(setting.everything.start, setting.everything.question, Pose.parse("x=-0.01,y=0.03"), setting.motion)
+    setup = ObservedRobot.of("rrrrr_m1", best.legs)
+    goal = reach(
+        setup.all_samples.start, setup.all_samples.observation_model, Pose.parse("x=-0.01,y=0.03"), setup.motion
+    )
     assert best.ends is not None
-    assert best.ends.length == pytest.approx(certified_radius(setting, goal).length)
-    found = RestSearch.of(setting, goal).answer(minima=True).attracting
+    assert best.ends.length == pytest.approx(certified_radius(setup, goal).length)
+    found = EquilibriumSearch.of(setup, goal).answer(minima=True).stable
     assert best.ends.others == tuple(sorted(each.kind for each in found if each.kind != "goal"))
     assert best.ends.others
-    record = best.to_dict()["endings"]
+    record = best.to_dict()["equilibria"]
     assert record["attracting"] == len(record["kinds"]) == len(best.ends.others)
 
 
 def test_a_singular_end_discards() -> None:
     """On the symmetry axis of legs 1, 4 a Type 2 singularity lies between x = −0.2 and −0.1."""
-    setting = work().setting
-    batch = setting.batch
+    setup = work().setup
+    batch = setup.batch
     assert batch is not None
     low, high = -0.2, -0.1
     for _ in range(60):
@@ -260,8 +265,10 @@ def test_a_singular_end_discards() -> None:
         values = batch.evaluate(X, ["1", "4"]).determinant
         assert values is not None
         low, high = (low, X[1, 0, 3]) if values[0] * values[1] < 0 else (X[1, 0, 3], high)
-    pose = setting.motion.pose(X[1])
-    there = replace(work(), goal=reach(setting.everything.start, setting.everything.question, pose, setting.motion))
+    pose = setup.motion.pose(X[1])
+    there = replace(
+        work(), goal=reach(setup.all_samples.start, setup.all_samples.observation_model, pose, setup.motion)
+    )
     found = there.first(("1", "4"))
     assert found.discarded is not None
     assert "the goal is" in found.discarded
@@ -281,9 +288,9 @@ def test_hidden_is_what_a_fine_search_finds() -> None:
 
 
 def test_sight_sees_what_is_ahead_in_the_picture_and_not_hidden() -> None:
-    setting = ObservedRobot.of(load("quattro"), samples=2)
-    at = setting.everything.start
-    rods = dict(zip(setting.labels, cylinders(setting.mechanism, setting.observed), strict=True))
+    setup = ObservedRobot.of(load("quattro"), samples=2)
+    at = setup.all_samples.start
+    rods = dict(zip(setup.labels, cylinders(setup.mechanism, setup.observed), strict=True))
     below = rotation_from_rpy(0.0, 0.0, 0.0)
     sight = CameraView(Camera(pose([0, 0, -3.0], below)), "base", rods)
     assert all(part == 1.0 for part in sight.visible_parts(at).values())
@@ -406,9 +413,9 @@ def test_sets_of_points_are_ranked_by_what_attracts_their_loops(tmp_path: Path) 
 def test_how_far_it_is_is_told() -> None:
     """Each set by its number, then those that are examined; nothing of it afterwards."""
     stages: list[str] = []
-    with following(stages.append):
+    with on_progress(stages.append):
         found = select("rrrrr_m1", start="x=0,y=0.25", goal="x=0.02,y=0.25", runs=0, endings=0)
-        tell("over")
+        report("over")
     sets = [each.split(":")[0] for each in stages if each.startswith("set ")]
     every = len(found.candidates)
     assert list(dict.fromkeys(sets)) == [f"set {k + 1} of {every}" for k in range(every)]

@@ -22,17 +22,17 @@ from typing import Any
 
 import numpy as np
 
-from hrsynth.analysis.aspects.path import Aspects
-from hrsynth.analysis.aspects.words import SEPARATED
+from hrsynth.analysis.aspects.path import PathPlanner
+from hrsynth.analysis.aspects.verdicts import SEPARATED
 from hrsynth.budgets import RUN_AWAY
 from hrsynth.description import load
 from hrsynth.geometry.vectors import hat, rotation_from_rpy
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.locked import interaction
-from hrsynth.kinematics.relation import relation
+from hrsynth.kinematics.locked_twists import interaction
+from hrsynth.kinematics.velocity_relation import relation
 from hrsynth.mechanism.model import Mechanism
-from hrsynth.simulation.ending import ANTIPODAL, BOUNDARY, ENDINGS, GOAL, MINIMUM, MODE
 from hrsynth.simulation.law import FixedDirections, Law, directions
+from hrsynth.simulation.outcome import ANTIPODAL, BOUNDARY, ENDINGS, GOAL, MINIMUM, MODE
 from hrsynth.simulation.result import Servo
 from hrsynth.simulation.servo import Conditions, ServoTask
 from kinematics.robots import state_of
@@ -58,64 +58,66 @@ def run_between(
 ) -> Servo:
     """A run between two configurations of a shipped robot, all legs watched or some."""
     found = setting(name, watched)
-    law = Law(found.samples.question, found.dof, gain)
-    desired = FixedDirections(directions(goal, law.question)[0])
+    law = Law(found.samples.observation_model, found.dof, gain)
+    desired = FixedDirections(directions(goal, law.observation_model)[0])
     return ServoTask(found, start, goal, law, desired, Conditions(gain)).run()
 
 
 def untrue(found: Servo) -> Iterator[str]:
     """What is not as the ending's name says, by what the engine under test did not compute."""
-    last, at, question = found.run.commands[-1], found.run.last, found.setting.samples.question
-    u = np.array([o.value(at.pose(question.reference), at.pose(o.link)) for o in question.observations])
+    last, at, observation_model = found.run.commands[-1], found.run.last, found.setup.samples.observation_model
+    u = np.array(
+        [o.value(at.pose(observation_model.reference), at.pose(o.link)) for o in observation_model.observations]
+    )
     e = np.cross(u, found.desired)
     size, alike = float(np.linalg.norm(e)), np.sum(u * found.desired, axis=1)
     if abs(size - last.size) > 1e-12:
         yield f"‖e‖ is {size}, told {last.size}"
-    if found.ended not in ENDINGS:
-        yield f"{found.ended} is no ending"
-    if (size < VANISHED) != (found.ended in (GOAL, MODE, ANTIPODAL)):
-        yield f"{found.ended} with ‖e‖ = {size}"
-    if found.ended in (GOAL, MODE) and np.any(alike < 0):
-        yield f"{found.ended} with a direction turned over"
-    if found.ended == ANTIPODAL and np.all(alike > 0):
+    if found.outcome not in ENDINGS:
+        yield f"{found.outcome} is no ending"
+    if (size < VANISHED) != (found.outcome in (GOAL, MODE, ANTIPODAL)):
+        yield f"{found.outcome} with ‖e‖ = {size}"
+    if found.outcome in (GOAL, MODE) and np.any(alike < 0):
+        yield f"{found.outcome} with a direction turned over"
+    if found.outcome == ANTIPODAL and np.all(alike > 0):
         yield "antipodal with all directions alike"
-    if found.ended != ANTIPODAL and (max(found.from_goal) < THERE) != (found.ended == GOAL):
-        yield f"{found.ended} at {found.from_goal} from the goal"
-    if found.ended in (GOAL, MODE) and (open_ := Oracle(at.twin.mechanism).error(state_of(at.twin, at.q))) > CLOSED:
-        yield f"{found.ended} with loops open by {open_}"
-    if found.ended == MODE:
+    if found.outcome != ANTIPODAL and (max(found.from_goal) < THERE) != (found.outcome == GOAL):
+        yield f"{found.outcome} at {found.from_goal} from the goal"
+    if found.outcome in (GOAL, MODE) and (open_ := Oracle(at.model.mechanism).error(state_of(at.model, at.q))) > CLOSED:
+        yield f"{found.outcome} with loops open by {open_}"
+    if found.outcome == MODE:
         yield from _no_mode(found)
-    if found.ended == MINIMUM:
-        M = interaction(at, question)
+    if found.outcome == MINIMUM:
+        M = interaction(at, observation_model)
         L = np.vstack([-hat(w) @ M[3 * i : 3 * i + 3] for i, w in enumerate(found.desired)])
         if np.linalg.norm(np.linalg.pinv(L, rcond=1e-4) @ e.ravel()) > 1e-5:
             yield "the command does not vanish"
-    if found.ended == BOUNDARY:
-        moved = np.linalg.norm(found.way[-1] - found.way[0]) / at.twin.length
-        dof = relation(at, question).dof
-        if moved < RUN_AWAY and dof.value == found.setting.dof and dof.weakest > 1e-2:
+    if found.outcome == BOUNDARY:
+        moved = np.linalg.norm(found.way[-1] - found.way[0]) / at.model.length
+        dof = relation(at, observation_model).dof
+        if moved < RUN_AWAY and dof.value == found.setup.dof and dof.weakest > 1e-2:
             yield "no boundary is near"
 
 
 def _no_mode(found: Servo) -> Iterator[str]:
     """What is wrong where a run is said to end at another mode: all robots here have their modes listed. That one which
     merely fits is a mode is shown by the run, whose last state is closed and has the directions."""
-    listed = found.ending.modes
-    if listed is None or found.ending.matched is None:
-        yield f"mode: {found.ending.reason}"
+    listed = found.run_outcome.modes
+    if listed is None or found.run_outcome.matched is None:
+        yield f"mode: {found.run_outcome.reason}"
         return
-    mode, motion = listed.modes[found.ending.matched - 1], found.setting.motion
+    mode, motion = listed.modes[found.run_outcome.matched - 1], found.setup.motion
     X = found.settled.pose(motion.link)
-    if mode.goal or not (mode.proved or mode.fits is not None):
-        yield f"mode {found.ending.matched} is the goal, or neither proved nor known to fit"
+    if mode.goal or not (mode.proved or mode.match_residual is not None):
+        yield f"mode {found.run_outcome.matched} is the goal, or neither proved nor known to fit"
     p = [value or 0.0 for value in (mode.pose.x, mode.pose.y, mode.pose.z)]
     apart = float(np.linalg.norm(motion.position(X) - p))
     turned = 0.0 if mode.pose.rpy is None else float(np.abs(X[:3, :3] - rotation_from_rpy(*mode.pose.rpy)).max())
     if max(apart, turned) > THERE:
-        yield f"{apart} m, {turned} from mode {found.ending.matched}"
+        yield f"{apart} m, {turned} from mode {found.run_outcome.matched}"
 
 
-def untold(found: Servo, aspects: Aspects) -> Iterator[str]:
+def untold(found: Servo, aspects: PathPlanner) -> Iterator[str]:
     """Crossings that are not reported. Where the condition is an expression with a sign, the sign at the end is that
     of the start times −1 for each crossing of a Type 2 or constraint singularity (its wrenches are those of constraints
     as well); said of runs in which no leg passes its limit. A goal in another aspect is not reached without one."""
@@ -124,7 +126,7 @@ def untold(found: Servo, aspects: Aspects) -> Iterator[str]:
         return
     answer = aspects.join(*ends, budget=1)
     crossed = track.crossings("type2") + track.crossings("constraint")
-    if found.ended == GOAL and answer.verdict == SEPARATED and not track.passages:
+    if found.outcome == GOAL and answer.verdict == SEPARATED and not track.passages:
         yield "the goal is in another aspect, no crossing is told"
     values = answer.start.value, answer.goal.value
     if track.crossings("type1") or track.crossings("limit") or not answer.signed:
@@ -138,7 +140,7 @@ def runs(name: str, watched: Legs | None, seed: int, count: int, known: set[Key]
     keys = [(name, None if watched is None else ",".join(watched), seed, pair) for pair in range(1, count + 1)]
     if known.issuperset(keys):
         return
-    aspects, lists = Aspects.of(setting(name, watched)), Lists(setting(name, watched))
+    aspects, lists = PathPlanner.of(setting(name, watched)), Lists(setting(name, watched))
     drawn = zip(keys, far_pairs(name, seed, count, watched), strict=False)
     while block := list(islice(((key, *ends) for key, ends in drawn if key not in known), AT_ONCE)):
         first = len(lists.every)
@@ -151,7 +153,7 @@ def runs(name: str, watched: Legs | None, seed: int, count: int, known: set[Key]
                 **dict(zip(KEY, key, strict=True)),
                 "start": str(found.start),
                 "goal": str(found.goal),
-                "ended": found.ended,
+                "ended": found.outcome,
                 "untrue": wrong,
                 **member.to_dict(),
             }
@@ -187,7 +189,9 @@ def tables(records: Sequence[dict[str, Any]], names: Sequence[str]) -> dict[str,
         for name in names:
             of = ", ".join(f"`{each}`" for each in same_question(name))
             for watched, what in ((False, of), (True, f"{of}, random sets")):
-                own = [each for each in records if each["robot"] == name and (each["watched"] is not None) == watched]
+                own = [
+                    each for each in records if each["robot"] == name and (each["observations"] is not None) == watched
+                ]
                 if own and not (watched and mark == START):
                     counted = Counter(each[field] for each in own)
                     wrong = (sum(map(len, (each["untrue"] for each in own))),) if mark == START else ()

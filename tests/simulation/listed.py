@@ -18,12 +18,12 @@ from hrsynth.budgets import ENDING_STEPS, FARTHEST_ENDING
 from hrsynth.constraints.pattern import leg_ends
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.simulation.ending import ANTIPODAL, BOUNDARY, GOAL, MINIMUM, MODE
-from hrsynth.simulation.endings.descent import LONGEST_STEP, CriticalPoint, Expansion, are_closed, walk_at_random
-from hrsynth.simulation.endings.endings import NEARBY, RestSearch
-from hrsynth.simulation.endings.error import DirectionTerm, RestSystem
-from hrsynth.simulation.endings.rests import CRITICAL, RestPoint
-from hrsynth.simulation.endings.search import Critical, in_mode, marks, starts
+from hrsynth.simulation.equilibria.descent import LONGEST_STEP, CriticalPoint, Expansion, are_closed, walk_at_random
+from hrsynth.simulation.equilibria.equilibria import NEARBY, EquilibriumSearch
+from hrsynth.simulation.equilibria.equilibrium import CRITICAL, Equilibrium
+from hrsynth.simulation.equilibria.error import DirectionTerm, ErrorSystem
+from hrsynth.simulation.equilibria.search import CountedCriticalPoint, in_mode, marks, starts
+from hrsynth.simulation.outcome import ANTIPODAL, BOUNDARY, GOAL, MINIMUM, MODE
 from hrsynth.simulation.result import Servo
 from hrsynth.tolerances import CRITICAL as AT_ZERO
 from hrsynth.tolerances import CRITICAL_FLAT, SAME_ENDING
@@ -45,7 +45,7 @@ well; descents at once."""
 def pool(name: str) -> Array:
     """Random starts (c, N) of a robot, whatever its goal."""
     found = setting(name)
-    system = RestSearch.of(found, found.everything.start).system
+    system = EquilibriumSearch.of(found, found.all_samples.start).system
     homes = np.array([system.system.read(at.pose) for at in found.configurations])
     return np.concatenate(list(islice(starts(system, homes, 0, found), ROUNDS)))
 
@@ -76,7 +76,7 @@ class Rests:
     """What was found of a goal: the rests that are told apart, each with what tells it apart (a row of ``places``), and
     those that fill curves, as (‖e‖, place). A flat one that two starts come to is one by itself."""
 
-    search: RestSearch
+    search: EquilibriumSearch
     points: list[CriticalPoint] = field(default_factory=list)
     places: list[Array] = field(default_factory=list)
     continua: list[tuple[float, Array]] = field(default_factory=list)
@@ -93,11 +93,15 @@ class Rests:
         self.places.append(place)
         return True
 
-    def read(self, number: int) -> RestPoint | None:
+    def read(self, number: int) -> Equilibrium | None:
         """A rest as a pose of the robot, in its operation mode."""
-        system, found, q = self.search.system, self.search.setting, self.points[number].q[None]
+        system, found, q = self.search.system, self.search.setup, self.points[number].q[None]
         nearby = walk_at_random(system, q, np.random.default_rng(0), 2, NEARBY)
-        return self.search.read(Critical(self.points[number], 0)) if in_mode(system, found, nearby)[0] else None
+        return (
+            self.search.read(CountedCriticalPoint(self.points[number], 0))
+            if in_mode(system, found, nearby)[0]
+            else None
+        )
 
 
 class Lists:
@@ -113,7 +117,7 @@ class Lists:
         finds something."""
         drawn, first = pool(self.setting.robot.name), len(self.every)
         many = len(drawn) // ROUNDS
-        self.every += [Rests(RestSearch.of(self.setting, goal)) for goal in goals]
+        self.every += [Rests(EquilibriumSearch.of(self.setting, goal)) for goal in goals]
         own = range(first, len(self.every))
         desired = np.array([each.search.desired.ravel() for each in self.every])
         order = [np.argsort(np.linalg.norm(desired - desired[k], axis=1))[1 : NEIGHBOURS + 1] for k in own]
@@ -154,8 +158,8 @@ class Lists:
         """What tells rests q (n, N) apart, (n, m): the observed directions, the poses of the platform's bodies."""
         found, system = self.setting, self.every[0].search.system
         points = [CriticalPoint(each, each, 0.0, each, 0.0) for each in q]
-        every, seen = found.everything.question.observations, {(o.leg, o.link) for o in found.observed}
-        told = marks(system, found, leg_ends(found.anatomy), points)
+        every, seen = found.all_samples.observation_model.observations, {(o.leg, o.link) for o in found.observed}
+        told = marks(system, found, leg_ends(found.decomposition), points)
         if not len(points):
             return told
         bodies = told.shape[1] - 3 * len(every)
@@ -163,7 +167,7 @@ class Lists:
 
 
 def descents(
-    systems: Sequence[RestSystem], starts: Sequence[Array], goals: Sequence[int], idle: int
+    systems: Sequence[ErrorSystem], starts: Sequence[Array], goals: Sequence[int], idle: int
 ) -> list[tuple[int, CriticalPoint]]:
     """The critical points to which starts (n, N) lead that go down all along, each with the number of its system; so
     many at once, whatever their systems, which differ in the desired directions alone."""
@@ -207,7 +211,7 @@ class Listed:
     """The nearest of all rests of a run's goal to its end, how far that is, and how many there are."""
 
     ended: str
-    nearest: RestPoint | None
+    nearest: Equilibrium | None
     distance: float
     rests: int
     continuum: bool
@@ -216,7 +220,7 @@ class Listed:
     def of(cls, found: Servo, lists: Lists | None = None, number: int = 0) -> Listed:
         """That of a run to the goal of so many in the lists; without them one is made."""
         if lists is None:
-            lists = Lists(found.setting)
+            lists = Lists(found.setup)
             lists.add([found.target])
         own, end = lists.every[number], found.run.commands[-1]
         here = lists.places([own.search.system.system.read(found.settled.pose)])
@@ -224,7 +228,7 @@ class Listed:
         near = int(np.argmin(away)) if len(away) else None
         rest = own.read(near) if near is not None and away[near] < NEAR else None
         return cls(
-            found.ended,
+            found.outcome,
             rest,
             np.inf if near is None else float(away[near]),
             len(own.points),
@@ -244,12 +248,12 @@ class Listed:
 
     def untrue(self, found: Servo) -> Iterator[str]:
         """What does not fit together: the list's name of the rest and the run's."""
-        if self.member in (GOAL, MODE, ANTIPODAL) and self.member != found.ended:
-            yield f"{found.ended}, listed as {self.member}"
-        if self.member in (CRITICAL, SINGULAR) and found.ended in (GOAL, MODE, ANTIPODAL):
-            yield f"{found.ended}, listed as {self.member}"
+        if self.member in (GOAL, MODE, ANTIPODAL) and self.member != found.outcome:
+            yield f"{found.outcome}, listed as {self.member}"
+        if self.member in (CRITICAL, SINGULAR) and found.outcome in (GOAL, MODE, ANTIPODAL):
+            yield f"{found.outcome}, listed as {self.member}"
         if self.nearest is not None and self.nearest.stable is False:
-            yield f"{found.ended} at a rest that is listed as {self.nearest.stability}"
+            yield f"{found.outcome} at a rest that is listed as {self.nearest.stability}"
 
     def to_dict(self) -> dict[str, Any]:
         return {"member": self.member, "distance": self.distance, "rests": self.rests}

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from _pytest.mark import ParameterSet
 
-from hrsynth.analysis.asked import configurations_at
+from hrsynth.analysis.configuration_report import REGULAR, ConfigurationAnalysis
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.analysis.posture import REGULAR, ConfigurationAnalysis
-from hrsynth.batch.reach import reach
-from hrsynth.description import load, shipped
+from hrsynth.analysis.pose_requests import configurations_at
+from hrsynth.batch.pose_continuation import reach
+from hrsynth.description import list_robots, load
 from hrsynth.errors import PoseNotReached
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.walking import random_walk
@@ -51,7 +51,7 @@ CONTROLLABLE = [
 """With all legs watched."""
 FEW = ["3rpr_m1", "3rps", "delta", "gough_stewart", "quattro", "quattro_rigid", "rrrrr_m1"]
 """Of all kinds: the others are left to the slow tests."""
-BLIND = sorted(set(shipped()) - set(CONTROLLABLE))
+BLIND = sorted(set(list_robots()) - set(CONTROLLABLE))
 
 
 def few_first(names: list[str]) -> list[ParameterSet]:
@@ -107,14 +107,14 @@ def regular(
     ``tried`` steps are made."""
     found = setting(name, watched)
     examiner = ConfigurationAnalysis(found)
-    question, start = found.everything.question, found.everything.start
+    observation_model, start = found.all_samples.observation_model, found.all_samples.start
     usual = np.median([examiner.classify(at).distances.type2 or 0.0 for at in found.configurations])
     for at in islice(random_walk(start, tried, seed=seed, steps=steps), apart - 1, None, apart):
         posture = examiner.classify(at)
         if posture.hidden.state != REGULAR or (posture.distances.type2 or 0.0) < distance * usual:
             continue
         try:
-            there = reach(start, question, posture.pose, found.motion)
+            there = reach(start, observation_model, posture.pose, found.motion)
         except PoseNotReached:
             continue
         yield there

@@ -7,12 +7,12 @@ from os import environ
 import numpy as np
 import pytest
 
-from hrsynth.description import load, shipped
+from hrsynth.description import list_robots, load
 from hrsynth.errors import BadMechanism, BadRequest, MissingExtra
 from hrsynth.mechanism import Joint, JointType
-from hrsynth.simulation.bench import Bench
+from hrsynth.simulation.dynamics import DynamicSimulation
 from hrsynth.simulation.law import FixedDirections, Law, directions
-from hrsynth.simulation.mockup import mockup
+from hrsynth.simulation.mujoco_model import mockup
 from hrsynth.simulation.run import Loop
 from hrsynth.simulation.servo import servo
 from simulation.scenes import CONTROLLABLE, few_first, regular, setting
@@ -21,7 +21,7 @@ environ.setdefault("MUJOCO_GL", "egl")
 mujoco = pytest.importorskip("mujoco")
 
 
-@pytest.mark.parametrize("name", few_first(sorted(shipped())))
+@pytest.mark.parametrize("name", few_first(sorted(list_robots())))
 def test_a_mock_up_has_the_freedoms_of_the_robot_and_its_motors(name: str):
     found = setting(name)
     mechanism = found.mechanism
@@ -33,7 +33,7 @@ def test_a_mock_up_has_the_freedoms_of_the_robot_and_its_motors(name: str):
         rows = np.zeros((data.nefc, model.nv))
         mujoco.mju_sparse2dense(rows, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind)
     values = np.linalg.svd(rows, compute_uv=False)
-    start, _ = found.everything.start.kernel()
+    start, _ = found.all_samples.start.kernel()
     assert model.nv - int(np.sum(values > 1e-6 * values[0])) == start.shape[1]
     assert np.max(np.abs(data.efc_pos), initial=0.0) < 1e-12
     assert model.nu == sum(joint.type.freedoms for joint in mechanism.joints.values() if joint.actuated)
@@ -45,11 +45,11 @@ def test_a_mock_up_has_the_freedoms_of_the_robot_and_its_motors(name: str):
 def check_together(name: str) -> None:
     """A start of the zero configuration, a goal nearby: both loops end within a millimetre of each other."""
     found = setting(name)
-    start, goal = found.everything.start, next(regular(name, 5, 0.4, steps=3))
-    law = Law(found.samples.question, found.dof, 2.0)
-    loop = Loop(law, found.everything.question, FixedDirections(directions(goal, law.question)[0]))
+    start, goal = found.all_samples.start, next(regular(name, 5, 0.4, steps=3))
+    law = Law(found.samples.observation_model, found.dof, 2.0)
+    loop = Loop(law, found.all_samples.observation_model, FixedDirections(directions(goal, law.observation_model)[0]))
     still = loop.simulate(start, 30.0)
-    run, moved = Bench.of(found, start).run(loop, 12.0)
+    run, moved = DynamicSimulation.of(found, start).run(loop, 12.0)
     motion = found.motion
     there = still.last.pose(motion.link)
     X = moved @ start.pose(motion.link)
@@ -73,7 +73,7 @@ def test_the_other_simulated_robots_do_too(name: str):
 @pytest.mark.slow
 def test_the_bench_tells_how_far_it_stopped_from_there():
     found = servo(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.05,y=0.05,z=-0.62", physics=True, gain=4)
-    assert found.ended == "goal"
+    assert found.outcome == "goal"
     (note,) = found.notes
     assert float(note.split("stopped ")[1].split(" mm")[0]) < 1
     assert found.run.times[-1] <= 4
@@ -89,7 +89,7 @@ def test_noise_goes_through_the_bench_as_well():
         noise="0.5deg",
         time=2.0,
     )
-    assert found.ended == "goal"
+    assert found.outcome == "goal"
     assert found.spread is not None
     assert 1e-5 < found.spread.metres < 0.05
     assert len(found.notes) == 2

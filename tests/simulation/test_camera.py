@@ -15,10 +15,10 @@ from hrsynth.errors import BadRequest, MissingExtra, NotRendered
 from hrsynth.geometry.vectors import Array, unit
 from hrsynth.mechanism.noise import Noise
 from hrsynth.mechanism.observations.direction import Direction
-from hrsynth.simulation import pictures
+from hrsynth.simulation import rendered_images
 from hrsynth.simulation.camera import Camera, Edges, cylinders, edges, place_camera, rebuilt, sensitivity
 from hrsynth.simulation.law import directions
-from hrsynth.simulation.noise import PERIOD, Sensors, Shocks
+from hrsynth.simulation.noise import PERIOD, NoiseSamples, Sensors
 from hrsynth.simulation.servo import servo
 from simulation.scenes import home
 
@@ -55,14 +55,14 @@ def test_a_pixel_and_its_ray_are_one(x: float, y: float):
 @pytest.mark.parametrize("name", ["3rpr_m1", "quattro"])
 def test_the_camera_sees_all_rods_and_exact_edges_give_exact_directions(name: str):
     scene = home(name)
-    mechanism, question = scene.setting.mechanism, scene.law.question
-    rods = cylinders(mechanism, question.observations)
-    camera = place_camera(rods, question.reference, (scene.start.pose,))
+    mechanism, observation_model = scene.setup.mechanism, scene.law.observation_model
+    rods = cylinders(mechanism, observation_model.observations)
+    camera = place_camera(rods, observation_model.reference, (scene.start.pose,))
     for rod in rods:
-        pixels = camera.pixels(camera.project(scene.start.pose(question.reference), scene.start.pose, rod))
+        pixels = camera.pixels(camera.project(scene.start.pose(observation_model.reference), scene.start.pose, rod))
         assert np.all((pixels > 0) & (pixels < [camera.width, camera.height]))
-    sense = Edges(camera, question.reference, rods, 0.0, Shocks.draw(2 * len(rods), 1, 0))
-    u = directions(scene.start, question)[0]
+    sense = Edges(camera, observation_model.reference, rods, 0.0, NoiseSamples.draw(2 * len(rods), 1, 0))
+    u = directions(scene.start, observation_model)[0]
     assert sense(0.0, scene.start.pose, u) == pytest.approx(u, abs=1e-9)
 
 
@@ -73,26 +73,26 @@ def test_a_carried_camera_sees_the_same_directions_from_its_link():
     found = servo(
         robot, camera=carried, start="x=0,y=0,z=-0.6", goal="x=0.05,y=0,z=-0.6", sense="edges", gain=8, time=1.0
     )
-    assert found.ended == "goal"
+    assert found.outcome == "goal"
     assert found.spread is not None
     assert found.spread.metres < 0.01
-    assert found.setting.samples.question.reference == carried
+    assert found.setup.samples.observation_model.reference == carried
 
 
 def test_the_noise_of_rebuilt_directions_grows_with_that_of_pixels_and_is_bounded_by_the_sensitivity():
     scene = home("delta")
-    question = scene.law.question
-    rods = cylinders(scene.setting.mechanism, question.observations)
-    camera = place_camera(rods, question.reference, (scene.start.pose,))
-    u = directions(scene.start, question)[0]
+    observation_model = scene.law.observation_model
+    rods = cylinders(scene.setup.mechanism, observation_model.observations)
+    camera = place_camera(rods, observation_model.reference, (scene.start.pose,))
+    u = directions(scene.start, observation_model)[0]
 
     def wrong(pixels: float) -> Array:
-        sense = Edges(camera, question.reference, rods, pixels, Shocks.draw(2 * len(rods), 4, 0))
+        sense = Edges(camera, observation_model.reference, rods, pixels, NoiseSamples.draw(2 * len(rods), 4, 0))
         return np.array([np.linalg.norm(sense(t, scene.start.pose, u) - u, axis=1) for t in np.arange(0, 4, 0.04)])
 
     assert wrong(0.02).max() == pytest.approx(2 * wrong(0.01).max(), rel=0.05)
     for number, rod in enumerate(rods):
-        ends = camera.project(scene.start.pose(question.reference), scene.start.pose, rod)
+        ends = camera.project(scene.start.pose(observation_model.reference), scene.start.pose, rod)
         assert wrong(0.01)[:, number].max() <= 1.1 * sensitivity(ends, rod.radius) * 0.01 / camera.focal
 
 
@@ -144,7 +144,7 @@ def test_amounts_that_are_none(text: str):
 def test_without_opencv_pictures_are_refused_in_one_line(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(__import__("sys").modules, "cv2", None)
     with pytest.raises(MissingExtra, match=r"hrsynth\[bench\]") as raised:
-        servo(load("delta"), start="x=0,y=0", goal="x=0.05,y=0", sense="pictures")
+        servo(load("delta"), start="x=0,y=0", goal="x=0.05,y=0", sense="rendered_images")
     assert raised.value.exit_status == 3
 
 
@@ -153,23 +153,23 @@ def test_without_opencv_pictures_are_refused_in_one_line(monkeypatch: pytest.Mon
 @pytest.mark.parametrize("name", ["delta", "quattro"])
 def test_directions_from_rendered_pictures(name: str):
     pytest.importorskip("cv2")
-    pictures.drawing()
+    rendered_images.drawing()
     scene = home(name)
-    mechanism, question = scene.setting.mechanism, scene.law.question
-    rods = cylinders(mechanism, question.observations)
-    camera = place_camera(rods, question.reference, (scene.start.pose,))
-    stage = pictures.LegRenderer(mechanism, camera, question.reference, rods)
+    mechanism, observation_model = scene.setup.mechanism, scene.law.observation_model
+    rods = cylinders(mechanism, observation_model.observations)
+    camera = place_camera(rods, observation_model.reference, (scene.start.pose,))
+    stage = rendered_images.LegRenderer(mechanism, camera, observation_model.reference, rods)
     try:
         picture = stage.picture(scene.start.pose)
     except NotRendered as error:
         pytest.skip(str(error))
     assert picture.shape == (camera.height, camera.width, 3)
-    u = directions(scene.start, question)[0]
-    seen = pictures.Pictures(stage)(0.0, scene.start.pose, u)
+    u = directions(scene.start, observation_model)[0]
+    seen = rendered_images.RenderedImages(stage)(0.0, scene.start.pose, u)
     wrong = np.degrees(np.linalg.norm(np.cross(seen, u), axis=1))
     assert np.all((wrong > 0) & (wrong < 1.0))
-    drawn = [pictures.shade(picture, colour) > 127 for colour in pictures.COLOURS[: len(rods)]]
+    drawn = [rendered_images.shade(picture, colour) > 127 for colour in rendered_images.COLOURS[: len(rods)]]
     for rod, seen_there in zip(rods, drawn, strict=True):
-        ends = camera.pixels(camera.project(scene.start.pose(question.reference), scene.start.pose, rod))
+        ends = camera.pixels(camera.project(scene.start.pose(observation_model.reference), scene.start.pose, rod))
         middle = np.round(ends.mean(axis=0) - 0.5).astype(int)
         assert seen_there[middle[1], middle[0]]

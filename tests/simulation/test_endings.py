@@ -11,7 +11,7 @@ import hrsynth.simulation.run as engine
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import load
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.simulation.ending import BOUNDARY, TIME, UNDECIDED
+from hrsynth.simulation.outcome import BOUNDARY, TIME, UNDECIDED
 from hrsynth.simulation.result import Servo
 from hrsynth.simulation.run import rest_near
 from hrsynth.simulation.servo import ServoTask
@@ -31,8 +31,8 @@ def test_a_leg_that_is_stretched_is_a_boundary_however_long_the_run_may_take() -
         goal="x=0.342,y=-0.267,z=-0.812",
     )
     found = [scene.result(scene.loop().simulate(scene.start, lasts)) for lasts in (25, 75, 400)]
-    assert [each.ended for each in found] == [BOUNDARY] * 3
-    assert all("not watched is stretched" in each.ending.reason for each in found)
+    assert [each.outcome for each in found] == [BOUNDARY] * 3
+    assert all("not watched is stretched" in each.run_outcome.reason for each in found)
     assert np.allclose(found[0].way[-1], found[1].way[-1], atol=1e-6)
     assert np.allclose(found[0].way[-1], found[2].way[-1], atol=1e-6)
 
@@ -52,14 +52,14 @@ def runs(
 def check_endings(name: str, seed: int, count: int, monkeypatch: pytest.MonkeyPatch) -> None:
     for start, goal in far_pairs(name, seed, count):
         with monkeypatch.context() as patch:
-            found = [each for each in runs(name, start, goal, patch) if each.ended not in (TIME, UNDECIDED)]
+            found = [each for each in runs(name, start, goal, patch) if each.outcome not in (TIME, UNDECIDED)]
         assert found
         for each in found[1:]:
-            assert each.ended == found[0].ended
-            assert ("runs away" in each.ending.reason) == ("runs away" in found[0].ending.reason)
-            if "runs away" in each.ending.reason:
+            assert each.outcome == found[0].outcome
+            assert ("runs away" in each.run_outcome.reason) == ("runs away" in found[0].run_outcome.reason)
+            if "runs away" in each.run_outcome.reason:
                 continue  # it ends nowhere
-            assert np.allclose(each.way[-1], found[0].way[-1], atol=1e-5 * start.twin.length)
+            assert np.allclose(each.way[-1], found[0].way[-1], atol=1e-5 * start.model.length)
             assert np.allclose(each.turns[-1], found[0].turns[-1], atol=1e-5)
 
 

@@ -62,7 +62,7 @@ def test_a_film_ends_with_the_watched_leg_over_its_wanted_place():
     """At the goal what is seen covers what is to be seen: no pale colour is left, and there was some at the start."""
     image_of = pytest.importorskip("PIL.Image")
     found = hrsynth.servo(hrsynth.load("3rpr_m1"), start="x=0,y=0,phi=0", goal="x=0.03,y=0.02,phi=0.1")
-    assert found.ended == "goal"
+    assert found.outcome == "goal"
     try:
         image = image_of.open(io.BytesIO(animation(found)))
     except hrsynth.errors.NotRendered:

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hrsynth.analysis.asked import configurations_at
-from hrsynth.analysis.aspects.path import Aspects
-from hrsynth.batch.reach import reach
+from hrsynth.analysis.aspects.path import PathPlanner
+from hrsynth.analysis.pose_requests import configurations_at
+from hrsynth.batch.pose_continuation import reach
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PoseNotReached
 from hrsynth.geometry.ranks import range_basis
@@ -20,10 +20,10 @@ from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.tasks import solve
 from hrsynth.mechanism.model import Limits
 from hrsynth.mechanism.pose import asked_poses
-from hrsynth.simulation.ending import BOUNDARY, GOAL, MODE
+from hrsynth.simulation.crossings import track_run
+from hrsynth.simulation.outcome import BOUNDARY, GOAL, MODE
 from hrsynth.simulation.run import LIMIT
 from hrsynth.simulation.servo import servo
-from hrsynth.simulation.track import track_run
 from hrsynth.tolerances import DAMPED
 from simulation.far import run_between, untold, untrue
 from simulation.listed import APART, OUTSIDE, Listed
@@ -38,16 +38,16 @@ def near(name: str) -> tuple[ClosedConfiguration, ClosedConfiguration]:
     found = setting(name)
     goal = next(regular(name, 2, 0.5))
     kernel, _ = goal.kernel()
-    moves = range_basis((found.everything.question.rows(goal) @ kernel).T, 1.0)[0]
+    moves = range_basis((found.all_samples.observation_model.rows(goal) @ kernel).T, 1.0)[0]
     step = kernel @ moves @ np.full(moves.shape[1], 0.05 / np.sqrt(moves.shape[1]))
-    q, _ = solve(goal.twin, goal.twin.integrate(goal.q, step), tolerance=1e-12)
-    return ClosedConfiguration.of(goal.twin, q), goal
+    q, _ = solve(goal.model, goal.model.integrate(goal.q, step), tolerance=1e-12)
+    return ClosedConfiguration.of(goal.model, q), goal
 
 
 def check_near(name: str) -> None:
     start, goal = near(name)
     found = run_between(name, start, goal)
-    assert found.ended == GOAL
+    assert found.outcome == GOAL
     assert found.track.crossings("type2") == ()
     assert max(found.from_goal) < 1e-6
     assert np.all(np.diff([command.size for command in found.run.commands]) < 1e-9)
@@ -66,7 +66,7 @@ def test_starts_near_the_goal_end_there_for_the_other_robots(name: str):
 
 
 def check_far(name: str, seed: int, count: int) -> None:
-    aspects = Aspects.of(load(name))
+    aspects = PathPlanner.of(load(name))
     for start, goal in far_pairs(name, seed, count):
         found = run_between(name, start, goal)
         listed = Listed.of(found)
@@ -92,7 +92,7 @@ def test_a_crossing_is_told_where_the_side_changes():
     found = setting("quattro", ("1", "4"))
     along = -0.1757 + np.array([-2e-2, -1e-2, -1e-3, -1e-4, -2e-5, 2e-5, 1e-4, 2e-4, 1e-3, 1e-2, 2e-2])
     at = configurations_at(found, asked_poses([f"x={x},y=-0.1931,z=-0.6481,phi=0.262" for x in along]))
-    track = track_run(at, found.samples.question, found.everything.question, found.dof)
+    track = track_run(at, found.samples.observation_model, found.all_samples.observation_model, found.dof)
     (crossing,) = track.crossings("type2")
     assert track.passages == (crossing,)
     assert abs(crossing.place - int(np.argmin(track.smallest))) <= 1
@@ -106,7 +106,7 @@ def test_a_crossing_is_told_where_a_configuration_lies_on_it(kind: str, bend: fl
     the configurations."""
     found = setting("rrrrr_m1")
     at = [five_bar(found, kind, bend, step) for step in np.linspace(-0.3, 0.3, 13)]
-    track = track_run(at, found.samples.question, found.everything.question, found.dof)
+    track = track_run(at, found.samples.observation_model, found.all_samples.observation_model, found.dof)
     assert [each.kind for each in track.passages] == [kind]
 
 
@@ -128,8 +128,8 @@ def five_bar(found, kind, bend, step):
         elbows = A + np.array([l1, l2]) * np.exp(1j * (0.9 + bend + np.array([0, step])))
         tip = met(elbows[1], r2, elbows[0], r1)
     turned, swung = np.angle(elbows - A) - cranks, np.angle(tip - elbows) - rods
-    twin = found.everything.twin
-    step = np.zeros(twin.model.nv)
+    model = found.all_samples.model
+    step = np.zeros(model.model.nv)
     for name, value in {
         "shoulder_1": turned[0],
         "shoulder_2": turned[1],
@@ -137,8 +137,8 @@ def five_bar(found, kind, bend, step):
         "elbow_2": swung[1] - turned[1],
         "end": swung[1] - swung[0],
     }.items():
-        step[twin.coordinates[name][0]] = value
-    return ClosedConfiguration.of(twin, twin.q0 + step)
+        step[model.coordinates[name][0]] = value
+    return ClosedConfiguration.of(model, model.q0 + step)
 
 
 def met(one, far, two, near):
@@ -183,8 +183,8 @@ def test_a_run_says_what_it_leaves_out(name: str, given: dict[str, str], made: d
 )
 def test_two_legs_of_the_robot_with_an_articulated_platform(legs: str, ended: str, z: float):
     found = servo(load("quattro"), legs, start="x=0,y=0,z=-0.75,phi=0", goal="x=-0.2,y=0,z=-0.56,phi=0")
-    assert (found.ended, found.pose.z) == (ended, pytest.approx(z, abs=1e-4))
-    assert (found.ending.matched is not None) == (ended == MODE)
+    assert (found.outcome, found.pose.z) == (ended, pytest.approx(z, abs=1e-4))
+    assert (found.run_outcome.matched is not None) == (ended == MODE)
     assert list(untrue(found)) == []
 
 
@@ -192,7 +192,7 @@ def test_two_legs_of_the_robot_with_an_articulated_platform(legs: str, ended: st
 @pytest.mark.parametrize(("legs", "ended", "z"), [("1,2", MODE, -0.7023), ("1,3", GOAL, -0.7)])
 def test_two_legs_of_the_robot_with_a_rigid_platform(legs: str, ended: str, z: float):
     found = servo(load("quattro_rigid"), legs, start="x=0.1,y=0.04,z=-0.93", goal="x=0,y=-0.25,z=-0.7", gain=5)
-    assert (found.ended, found.pose.z) == (ended, pytest.approx(z, abs=1e-4))
+    assert (found.outcome, found.pose.z) == (ended, pytest.approx(z, abs=1e-4))
     assert list(untrue(found)) == []
 
 
@@ -205,7 +205,7 @@ def test_noise_keeps_the_platform_about_the_goal_and_more_of_it_further_away():
         found = servo(
             load("rrrrr_m1"), start="x=0.02,y=0.2195", goal="x=0.02,y=0.22", gain=4, noise=noise, time=3.0, seed=seed
         )
-        assert found.ended == GOAL
+        assert found.outcome == GOAL
         assert found.spread is not None
         return found.spread.rms_metres
 
@@ -219,7 +219,7 @@ def test_noise_keeps_the_platform_about_the_goal_and_more_of_it_further_away():
 def test_a_trajectory_is_followed_with_a_small_error():
     robot, ends = load("delta"), {"start": "x=0,y=0,z=-0.6", "goal": "x=0.1,y=0.1,z=-0.65"}
     led, at_once = servo(robot, duration=4.0, **ends), servo(robot, **ends)
-    assert (led.ended, at_once.ended) == (GOAL, GOAL)
+    assert (led.outcome, at_once.outcome) == (GOAL, GOAL)
     assert led.errors.max() < 0.01 * at_once.errors.max()
     assert led.run.times[-1] > 4
 
@@ -230,12 +230,12 @@ def test_a_trajectory_is_followed_with_a_small_error():
 )
 def test_a_trajectory_is_followed_where_parts_of_the_pose_depend_on_each_other(name: str, start: str, goal: str):
     found = servo(load(name), start=start, goal=goal, duration=2.0)
-    assert found.ended == GOAL
+    assert found.outcome == GOAL
     assert found.errors.max() < 1e-3
 
 
 def test_a_blocked_trajectory_tells_that_it_began_at_the_start(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("hrsynth.kinematics.steps.track", lambda here, motion, goal: (here, 0.5))
+    monkeypatch.setattr("hrsynth.kinematics.continuation.track", lambda here, motion, goal: (here, 0.5))
     with pytest.raises(PoseNotReached, match="from the start the robot gets"):
         servo(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0,z=-0.6", duration=2.0)
 
@@ -246,7 +246,7 @@ def test_a_bias_holds_the_platform_where_the_measured_directions_are_the_desired
         load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0.05,z=-0.65", noise="1deg", bias=True, gain=4, time=5.0
     )
     last = found.run.commands[-1]
-    assert found.ended == GOAL
+    assert found.outcome == GOAL
     assert found.spread is not None
     assert found.spread.aside
     assert found.spread.metres > 1e-3
@@ -258,16 +258,16 @@ def test_a_joint_limit_is_a_boundary():
     robot = load("delta")
     free = servo(robot, start="x=0,y=0,z=-0.6", goal="x=0.1,y=0.1,z=-0.65")
     joint = next(j for j in robot.joints.values() if j.actuated)
-    twin = free.run.last.twin
-    way = [twin.difference(twin.q0, at.q)[twin.coordinates[joint.name][0]] for at in free.run.configurations]
+    model = free.run.last.model
+    way = [model.difference(model.q0, at.q)[model.coordinates[joint.name][0]] for at in free.run.configurations]
     half = (way[0] + way[-1]) / 2
     limits = Limits(lower=half) if way[-1] < way[0] else Limits(upper=half)
     kept = robot.changed(joints=[replace(joint, limits=limits)])
     found = servo(kept, start="x=0,y=0,z=-0.6", goal="x=0.1,y=0.1,z=-0.65")
-    assert found.ended == BOUNDARY
-    assert joint.name in found.ending.reason
-    last, twin = found.run.last, found.run.last.twin
-    assert twin.difference(twin.q0, last.q)[twin.coordinates[joint.name][0]] == pytest.approx(half, abs=1e-8)
+    assert found.outcome == BOUNDARY
+    assert joint.name in found.run_outcome.reason
+    last, model = found.run.last, found.run.last.model
+    assert model.difference(model.q0, last.q)[model.coordinates[joint.name][0]] == pytest.approx(half, abs=1e-8)
 
 
 def limited(spans):
@@ -278,8 +278,8 @@ def limited(spans):
 
 def angles(run, joint):
     """A joint's angle along a run, (n,)."""
-    twin = run.last.twin
-    return np.array([twin.difference(twin.q0, at.q)[twin.coordinates[joint][0]] for at in run.configurations])
+    model = run.last.model
+    return np.array([model.difference(model.q0, at.q)[model.coordinates[joint][0]] for at in run.configurations])
 
 
 def test_limits_a_whole_turn_away_stop_where_they_are():
@@ -287,12 +287,12 @@ def test_limits_a_whole_turn_away_stop_where_they_are():
     way = angles(servo("rrrrr_m1", **ends).run, "shoulder_1")
     assert np.all(np.diff(way) * np.sign(way[-1] - way[0]) > -1e-9)
     turn, low, high = 2 * np.pi, way.min() - 0.1, way.max() + 0.1
-    assert servo(limited({"shoulder_1": (low + turn, high + turn)}), **ends).ended == GOAL
+    assert servo(limited({"shoulder_1": (low + turn, high + turn)}), **ends).outcome == GOAL
     # wider than a whole turn: the start lies between the limits after a whole turn alone, and one limit is on the way
     half = (way[0] + way[-1]) / 2
     span = sorted([(way[0] + half) / 2, half + np.copysign(turn, half - way[0])])
     found = servo(limited({"shoulder_1": span}), **ends)
-    assert (found.ended, found.ending.reason) == (BOUNDARY, "joint shoulder_1 is at its limit")
+    assert (found.outcome, found.run_outcome.reason) == (BOUNDARY, "joint shoulder_1 is at its limit")
     assert angles(found.run, "shoulder_1")[-1] == pytest.approx(half, abs=1e-8)
 
 
@@ -313,7 +313,7 @@ def test_a_joint_that_starts_beyond_its_limit_hides_no_other():
         ),
         **ends,
     )
-    assert (found.ended, found.ending.reason) == (BOUNDARY, "joint shoulder_2 is at its limit")
+    assert (found.outcome, found.run_outcome.reason) == (BOUNDARY, "joint shoulder_2 is at its limit")
     assert angles(found.run, "shoulder_2")[-1] == pytest.approx(half, abs=1e-8)
     assert any("beyond the limits of shoulder_1" in each for each in found.notes)
 
@@ -324,10 +324,10 @@ def test_a_noisy_run_that_meets_a_limit_is_over():
     ends = {"start": "x=0.05,y=0.2", "goal": "x=-0.05,y=0.2"}
     way = angles(servo("rrrrr_m1", **ends).run, "shoulder_1")
     robot = limited({"shoulder_1": sorted([way[-1] + 0.004 * np.sign(way[-1] - way[0]), 3 * way[0] - 2 * way[-1]])})
-    assert servo(robot, **ends).ended == GOAL
+    assert servo(robot, **ends).outcome == GOAL
     found = servo(robot, **ends, noise="1deg")
     assert (found.run.stopped, found.run.joint) == (LIMIT, "shoulder_1")
-    assert (found.ended, found.ending.reason) == (BOUNDARY, "joint shoulder_1 is at its limit")
+    assert (found.outcome, found.run_outcome.reason) == (BOUNDARY, "joint shoulder_1 is at its limit")
     assert found.spread is None
 
 
@@ -391,19 +391,21 @@ def test_robots_that_are_not_controllable_are_refused(name: str):
 
 def test_every_reached_pose_is_a_start():
     found = setting("delta")
-    at = reach(found.everything.start, found.everything.question, found.motion.pose(found.motion.home), found.motion)
-    assert run_between("delta", at, at).ended == GOAL
+    at = reach(
+        found.all_samples.start, found.all_samples.observation_model, found.motion.pose(found.motion.home), found.motion
+    )
+    assert run_between("delta", at, at).outcome == GOAL
 
 
 def test_a_run_whose_time_ends_tells_the_rest_it_is_on_its_way_to():
     """Near the goal ė = −λe: what is left falls by e every 1/λ. A longer run ends at the rest that is told."""
     asked = {"start": "x=0.01,y=0", "goal": "x=0,y=0", "gain": 0.5}
     short = servo("3rrr_m1", time=6.0, **asked)
-    assert short.ended == "time"
-    assert short.ending.reason.endswith(
+    assert short.outcome == "time"
+    assert short.run_outcome.reason.endswith(
         "; it was still on its way to a rest that attracts, found at the goal, where the distance left falls by a "
         "factor of e every 2 s"
     )
-    assert servo("3rrr_m1", **asked).ended == "goal"
+    assert servo("3rrr_m1", **asked).outcome == "goal"
     far = servo("3rrr_m1", start="x=0.05,y=0", goal="x=0,y=0", time=1.0)
-    assert "rest" not in far.ending.reason
+    assert "rest" not in far.run_outcome.reason

@@ -55,21 +55,21 @@ def true(found: Servo, corners: Array = CORNERS) -> bool:
     here, wanted = picture(found.settled, corners), picture(found.target, corners)
     apart = float(np.abs(here - wanted)[:, :2].max())
     same = np.allclose(found.settled.pose("wrist_3_link"), found.target.pose("wrist_3_link"), atol=1e-6)
-    if found.ended in ("goal", "mode"):
-        return apart < 1e-8 and here[:, 2].min() > 0 and same == (found.ended == "goal")
-    if found.ended == "lost from sight":
+    if found.outcome in ("goal", "mode"):
+        return apart < 1e-8 and here[:, 2].min() > 0 and same == (found.outcome == "goal")
+    if found.outcome == "lost from sight":
         return bool(0 < here[:, 2].min() < 1e-2 and apart > 1e-3)
-    if found.ended == "local minimum":
-        twin, q = found.settled.twin, found.settled.q
-        steps = 1e-5 * np.eye(twin.nv)
+    if found.outcome == "local minimum":
+        model, q = found.settled.model, found.settled.q
+        steps = 1e-5 * np.eye(model.nv)
         errors = [
-            np.sum((picture(ClosedConfiguration.of(twin, twin.integrate(q, s * step)), corners) - wanted)[:, :2] ** 2)
+            np.sum((picture(ClosedConfiguration.of(model, model.integrate(q, s * step)), corners) - wanted)[:, :2] ** 2)
             for step in steps
             for s in (1, -1)
         ]
         rising = np.array(errors).reshape(-1, 2)
         return apart > 1e-6 and bool(np.abs(rising[:, 0] - rising[:, 1]).max() < 1e-8)
-    return found.ended in ("boundary", "time") and apart > 1e-9
+    return found.outcome in ("boundary", "time") and apart > 1e-9
 
 
 @pytest.mark.slow
@@ -90,7 +90,7 @@ def true(found: Servo, corners: Array = CORNERS) -> bool:
 )
 def test_a_platform_comes_to_its_goal_with_any_sensors(see: tuple[str, ...]) -> None:
     found = platform(see)
-    assert found.ended == "goal"
+    assert found.outcome == "goal"
     X, wanted = (at.pose("platform") for at in (found.settled, found.target))
     np.testing.assert_allclose(X, wanted, atol=1e-8)
 
@@ -100,16 +100,16 @@ def test_a_depth_that_is_only_supposed_bends_the_way_and_may_make_the_goal_repel
     """The depths at the goal bend the way. One depth for all, which is not that of the point that stands out, does
     more: at the goal itself a motion grows under the law, and the run ends elsewhere."""
     exact, found, wrong = (platform(depth=depth) for depth in ("exact", "desired", "constant:0.8"))
-    assert found.ended == "goal"
-    assert wrong.ended == "local minimum"
+    assert found.outcome == "goal"
+    assert wrong.outcome == "local minimum"
     assert wrong.to_dict()["depth"] == "constant:0.8"
     assert [", depth: " in str(each) for each in (exact, found, wrong)] == [False, True, True]
     halfway = [np.array([np.interp(0.8, each.run.times, each.way[:, i]) for i in range(3)]) for each in (exact, found)]
     assert np.linalg.norm(halfway[0] - halfway[1]) > 1e-6
     for run, repels in ((exact, False), (found, False), (wrong, True)):
-        question, goal = run.setting.samples.question, run.target
-        law = Law(question, 6, 1.0, supposed_planes(run.depth, goal, question))
-        wanted, chart = measure_all(goal, question)[0], TangentChart.around(goal, question)
+        observation_model, goal = run.setup.samples.observation_model, run.target
+        law = Law(observation_model, 6, 1.0, supposed_planes(run.depth, goal, observation_model))
+        wanted, chart = measure_all(goal, observation_model)[0], TangentChart.around(goal, observation_model)
         flows = [law.at(chart.at(y, goal.q), (wanted, [0 * w for w in wanted])).velocity for y in 1e-5 * np.eye(6)]
         growth = float(np.linalg.eigvals(chart.basis.T @ np.array(flows).T / 1e-5).real.max())
         assert (growth > 0.1) is repels
@@ -123,28 +123,28 @@ def test_a_depth_that_nothing_needs_is_refused() -> None:
 
 def test_supposed_depths_make_other_rows_of_what_images_show_alone() -> None:
     robot = hrsynth.observe("gough_stewart", camera=EYE, see=[*POINTS, "distance:platform@0.1,0,0"])
-    question, at = robot.samples.question, robot.everything.start
-    assert supposed_planes("exact", at, question) is None
+    observation_model, at = robot.samples.observation_model, robot.all_samples.start
+    assert supposed_planes("exact", at, observation_model) is None
     for text in ("constant", "constant:", "constant:-1", "constant:inf", "far", ""):
         with pytest.raises(BadRequest):
-            supposed_planes(text, at, question)
-    planes = supposed_planes("constant:0.5", at, question)
+            supposed_planes(text, at, observation_model)
+    planes = supposed_planes("constant:0.5", at, observation_model)
     assert planes is not None
     assert [plane is None for plane in planes] == [False] * 4 + [True]
-    own = supposed_planes("desired", at, question)
-    wanted = measure_all(at, question)[0]
+    own = supposed_planes("desired", at, observation_model)
+    wanted = measure_all(at, observation_model)[0]
     moved = [0 * w for w in wanted]
     off = robot.configurations[0]
-    commands = [Law(question, 6, 1.0, each).at(off, (wanted, moved)) for each in (None, own, planes)]
+    commands = [Law(observation_model, 6, 1.0, each).at(off, (wanted, moved)) for each in (None, own, planes)]
     assert np.linalg.norm(commands[0].velocity - commands[2].velocity) > 1e-3
-    at_goal = [Law(question, 6, 1.0, each).at(at, (wanted, moved)).values for each in (None, own)]
+    at_goal = [Law(observation_model, 6, 1.0, each).at(at, (wanted, moved)).values for each in (None, own)]
     np.testing.assert_allclose(*at_goal, atol=1e-12)
 
 
 @pytest.mark.slow
 def test_a_led_loop_of_points_follows_more_closely() -> None:
     at_once, led = platform(), platform(duration=4.0)
-    assert led.ended == at_once.ended == "goal"
+    assert led.outcome == at_once.outcome == "goal"
     assert led.errors.max() < 0.05 * at_once.errors.max()
 
 
@@ -156,7 +156,7 @@ def test_noise_in_pixels_needs_a_focal_length_and_keeps_the_platform_near_its_go
         platform(noise="1mm")
     found = hrsynth.servo("gough_stewart", camera=SIZED, see=POINTS, start=START, goal=GOAL, noise="0.3px", time=4.0)
     assert found.spread is not None
-    assert found.ended == "goal"
+    assert found.outcome == "goal"
     assert 0 < found.spread.metres < 0.02
     worst = max(
         float(np.linalg.norm(seen[:2] / seen[2] - true[:2] / true[2]))
@@ -188,9 +188,9 @@ def test_noise_is_told_in_the_unit_in_which_it_is_given(
 
 def test_the_picture_of_a_camera_with_a_size_is_all_of_it(recwarn: pytest.WarningsRecorder) -> None:
     """Matplotlib says so where it does not keep the limits that it is given."""
-    setting = hrsynth.observe("gough_stewart", camera=SIZED, see=POINTS)
-    eye = replace(next(each for each in eyes(setting) if each.name == "eye"), width=640, height=480)
-    found = hrsynth.servo(setting, start=GOAL, goal=GOAL, time=0.4)
+    setup = hrsynth.observe("gough_stewart", camera=SIZED, see=POINTS)
+    eye = replace(next(each for each in eyes(setup) if each.name == "eye"), width=640, height=480)
+    found = hrsynth.servo(setup, start=GOAL, goal=GOAL, time=0.4)
     place = Figure((6, 2)).add_axes((0.1, 0.1, 0.8, 0.8))
     half = half_picture(eye)
     _picture(place, found, eye, half)
@@ -211,7 +211,7 @@ def test_what_stands_behind_the_camera_is_refused() -> None:
 def test_a_run_ends_where_a_camera_loses_sight() -> None:
     """Legs lead the platform; a point on its long arm, whose depth is measured, sweeps out of the picture on the way
     between two poses at which it is inside. There the run ends, to the picture's very side."""
-    home = hrsynth.observe("3rrr_m1").everything.start.pose("platform")[:3, 3]
+    home = hrsynth.observe("3rrr_m1").all_samples.start.pose("platform")[:3, 3]
     place = ",".join(f"{value:.6f}" for value in (home[0] + 0.5, home[1], home[2] - 0.92))
     options = {
         "see": "depth:platform@1,0,0",
@@ -219,14 +219,14 @@ def test_a_run_ends_where_a_camera_loses_sight() -> None:
         "goal": f"x={home[0]:.6f},y={home[1]:.6f},phi=0.25",
     }
     found = hrsynth.servo("3rrr_m1", "1,2,3", f"eye=base@{place}/0,0,0/500,530,500", **options)
-    assert found.ended == "lost from sight"
-    assert "depth_1" in found.ending.reason
+    assert found.outcome == "lost from sight"
+    assert "depth_1" in found.run_outcome.reason
     X = found.settled.pose("platform")
     x, y, z = X[:3, :3] @ [1, 0, 0] + X[:3, 3] - [float(word) for word in place.split(",")]
     assert x / z == pytest.approx(0.53, abs=2e-3)
     assert abs(y / z) < 0.5
     wide = hrsynth.servo("3rrr_m1", "1,2,3", f"eye=base@{place}/0,0,0/500,630,500", **options)
-    assert wide.ended in ("goal", "mode")
+    assert wide.outcome in ("goal", "mode")
 
 
 @pytest.mark.slow
@@ -237,14 +237,14 @@ def test_directions_are_fed_back_as_ever() -> None:
     see = [f"direction:{link}/{','.join(map(repr, map(float, axis)))}" for link, axis in links]
     poses = {"start": "x=0,y=0,phi=0", "goal": "x=0.02,y=0,phi=0.1"}
     one, other = hrsynth.servo("3rrr_m1", **poses), hrsynth.servo("3rrr_m1", see=see, **poses)
-    assert one.ended == other.ended == "goal"
+    assert one.outcome == other.outcome == "goal"
     np.testing.assert_allclose(one.errors[0], other.errors[0], atol=1e-12)
 
 
 @pytest.mark.slow
 def test_an_arm_comes_to_its_goal_by_what_its_hand_sees() -> None:
     found = arm("x=0.5,y=0.15,z=0.55,rpy=3.0/0.2/0.5")
-    assert found.ended == "goal"
+    assert found.outcome == "goal"
     assert true(found)
 
 
@@ -263,8 +263,8 @@ def test_an_arm_from_twenty_starts_ends_as_is_said() -> None:
             found = arm(start)
         except hrsynth.errors.HrsynthError:
             continue
-        assert true(found), (start, found.ended)
-        endings.append(found.ended)
+        assert true(found), (start, found.outcome)
+        endings.append(found.outcome)
         if len(endings) == 20:
             break
     assert len(endings) == 20
@@ -292,8 +292,8 @@ def test_a_line_that_comes_to_the_cameras_centre_ends_the_run(tmp_path: Path) ->
         "x=0.0761,y=0.0114,z=1.1308,rpy=0.6922/-0.4723/-0.279",
         "x=-0.1098,y=-0.0291,z=1.0424,rpy=-0.5704/0.6009/-1.3175",
     )
-    assert found.ending.name == "lost from sight"
-    assert "has no value there" in found.ending.reason
+    assert found.run_outcome.name == "lost from sight"
+    assert "has no value there" in found.run_outcome.reason
 
 
 @pytest.mark.slow
@@ -310,8 +310,8 @@ def test_supposed_depths_at_which_the_law_loses_rank_are_told(tmp_path: Path) ->
         "x=-0.1356,y=-0.0878,z=1.4949,rpy=-0.0945/0.1785/-1.5109",
         depth="constant:1",
     )
-    assert found.ending.name == "local minimum"
-    assert "the depths that it supposes, lose rank" in found.ending.reason
+    assert found.run_outcome.name == "local minimum"
+    assert "the depths that it supposes, lose rank" in found.run_outcome.reason
 
 
 @pytest.mark.parametrize("depth", ["constant:1e300", "constant:0", "constant:nan", "constant", "near"])

@@ -10,7 +10,7 @@ from typing import Annotated, Literal, NotRequired, TypedDict
 
 import numpy as np
 
-from ..description.sights import offers, split_offers
+from ..description.observation_text import offers, split_offers
 from ..errors import BadRequest, HrsynthError, RankUndecided
 from ..geometry import lines
 from ..geometry.ranks import kernel_basis, largest_angle, range_basis, singular_values
@@ -20,10 +20,11 @@ from ..mechanism import Direction, Joint, JointType, Mechanism, Observation
 from ..mechanism.observations import kinds
 from ..mechanism.sensors import encoders, observation_of, observed_line
 from ..options import WATCHING, option, plain_number
-from ..progress import tell
+from ..progress import report
 from ..records import FLAT, GAP, OPTIONAL, As, Recorded, Shown, Word, recorded
 from ..results import Result, Value
 from ..tolerances import RANK_CUTOFF, SAME_PRICE, SAME_RELATION
+from .analysis_declaration import analysis
 from .freedoms import Freedom
 from .observed import (
     CameraLike,
@@ -36,7 +37,6 @@ from .observed import (
     as_texts,
     restrict_samples,
 )
-from .question import analysis
 from .verdict import AT_REST, CONTROLLABLE, Verdict, verdict_of
 
 AXES = {JointType.UNIVERSAL: ("first", "second"), JointType.CYLINDRICAL: ("slide", "turn")}
@@ -93,65 +93,68 @@ class FurtherMeasurement(Value):
         return {**record, "link": seen["link"], "at": seen["at"], "axis": seen["axis"]}
 
 
-def candidates(setting: ObservedRobot, offered: Sequence[str] = ()) -> tuple[FurtherMeasurement, ...]:
+def candidates(setup: ObservedRobot, offered: Sequence[str] = ()) -> tuple[FurtherMeasurement, ...]:
     """Everything that could be added: legs, directions of other links, positions of observed lines, encoders, and what
     is ``offered``, in the words of ``--see``."""
     more = [
-        FurtherMeasurement("offered", text, each, each.leg) for text, each in zip(offered, setting.offered, strict=True)
+        FurtherMeasurement("offered", text, each, each.leg) for text, each in zip(offered, setup.offered, strict=True)
     ]
-    return (*_legs(setting), *_directions(setting), *_lines(setting), *_encoders(setting), *more)
+    return (*_legs(setup), *_directions(setup), *_lines(setup), *_encoders(setup), *more)
 
 
-def _legs(setting: ObservedRobot) -> Iterator[FurtherMeasurement]:
-    for segment in setting.segments:
-        if segment.leg not in setting.labels:
+def _legs(setup: ObservedRobot) -> Iterator[FurtherMeasurement]:
+    for segment in setup.segments:
+        if segment.leg not in setup.labels:
             yield FurtherMeasurement("leg", segment.leg, segment, segment.leg)
 
 
-def _directions(setting: ObservedRobot) -> Iterator[FurtherMeasurement]:
+def _directions(setup: ObservedRobot) -> Iterator[FurtherMeasurement]:
     """Segments of all legs but the observed ones and those that a leg is, along the directions that the file
     names where it does; links without a direction are left out."""
-    taken = {o.key for o in setting.observed} | {each.observation.key for each in _legs(setting)}
-    named = {o.key: o for o in setting.all_legs}
-    for leg in setting.anatomy.legs:
-        ends = (setting.mechanism.platform,) if leg.takes_platform else ()
+    taken = {o.key for o in setup.observed} | {each.observation.key for each in _legs(setup)}
+    named = {o.key: o for o in setup.all_legs}
+    for leg in setup.decomposition.legs:
+        ends = (setup.mechanism.platform,) if leg.takes_platform else ()
         for link in (*leg.links, *ends):
             if (leg.label, link) in taken:
                 continue
             try:
                 yield FurtherMeasurement(
-                    "direction", link, named.get((leg.label, link)) or observation_of(setting.anatomy, link), leg.label
+                    "direction",
+                    link,
+                    named.get((leg.label, link)) or observation_of(setup.decomposition, link),
+                    leg.label,
                 )
             except HrsynthError:
                 continue
 
 
-def _lines(setting: ObservedRobot) -> Iterator[FurtherMeasurement]:
-    for seen in setting.observed:
+def _lines(setup: ObservedRobot) -> Iterator[FurtherMeasurement]:
+    for seen in setup.observed:
         if isinstance(seen, Direction):
-            yield FurtherMeasurement("line", seen.link, observed_line(setting.anatomy, seen), seen.leg)
+            yield FurtherMeasurement("line", seen.link, observed_line(setup.decomposition, seen), seen.leg)
 
 
-def _encoders(setting: ObservedRobot) -> Iterator[FurtherMeasurement]:
+def _encoders(setup: ObservedRobot) -> Iterator[FurtherMeasurement]:
     """Encoders on all joints of the normal form, those with motors first; joints between links of an articulated
     platform are of no leg."""
-    anatomy = setting.anatomy
-    owner = {joint: leg.label for leg in anatomy.legs for joint in leg.joints}
-    for joint in sorted(anatomy.mechanism.joints.values(), key=lambda joint: not joint.actuated):
+    decomposition = setup.decomposition
+    owner = {joint: leg.label for leg in decomposition.legs for joint in leg.joints}
+    for joint in sorted(decomposition.mechanism.joints.values(), key=lambda joint: not joint.actuated):
         leg = owner.get(joint.name)
-        for number, encoder in enumerate(encoders(anatomy.mechanism, joint, leg or "")):
+        for number, encoder in enumerate(encoders(decomposition.mechanism, joint, leg or "")):
             axis = AXES[joint.type][number] if joint.type in AXES else None
-            if turned := _joints_behind(setting, joint, number):
+            if turned := _joints_behind(setup, joint, number):
                 yield FurtherMeasurement("encoder", " and ".join(turned), encoder, leg, None, joint.actuated)
             else:
                 yield FurtherMeasurement("encoder", joint.name, encoder, leg, axis, joint.actuated)
 
 
-def _joints_behind(setting: ObservedRobot, joint: Joint, number: int) -> list[str]:
+def _joints_behind(setup: ObservedRobot, joint: Joint, number: int) -> list[str]:
     """The joints of the file of which a joint of the normal form is made, those about its axis of this number; none
     where it is one of the file."""
     axis = joint.axes[min(number, len(joint.axes) - 1)]
-    made = [setting.robot.joints[name] for name in setting.normal.made_of.get(joint.name, ())]
+    made = [setup.robot.joints[name] for name in setup.normal.made_of.get(joint.name, ())]
     return [each.name for each in made if len(each.axes) == 1 and lines.parallel(each.axis, axis)]
 
 
@@ -168,12 +171,12 @@ BATCH = 2000
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Cure(Value):
+class SensorSuggestion(Value):
     """A set of measurements, and the verdict with them at all samples."""
 
     measurements: Recorded[tuple[FurtherMeasurement, ...]]
     verdict: Verdict
-    price: Recorded[float]
+    cost: Recorded[float]
     """Of all of them together; each is 1 where nothing else is said."""
 
     verdict_record = Shown(Word, lambda self: self.verdict.verdict, As("verdict"))
@@ -187,9 +190,9 @@ class Advice(Result, shown_as="advise"):
     """What is missing. ``now`` is the present verdict; ``sets`` are all the cheapest sets of the best rank that can be
     reached (the smallest ones if all prices are equal), empty if nothing is missing or nothing helps."""
 
-    setting: Annotated[ObservedRobot, FLAT]
+    setup: Annotated[ObservedRobot, FLAT]
     now: Verdict
-    sets: Recorded[tuple[Cure, ...]]
+    sets: Recorded[tuple[SensorSuggestion, ...]]
     tried: Recorded[int]
     complete: Recorded[bool]
     """Whether every set of this size and of all smaller ones was tried, and none was left undecided."""
@@ -199,7 +202,7 @@ class Advice(Result, shown_as="advise"):
     @property
     def robot(self) -> str:
         """The robot's name."""
-        return self.setting.robot.name
+        return self.setup.robot.name
 
     @property
     @recorded()
@@ -221,12 +224,12 @@ class Advice(Result, shown_as="advise"):
     def headline(self) -> str:
         """The robot, its verdict and how many sets of how many measurements help."""
         found = "nothing is missing" if self.nothing_missing else f"{len(self.sets)} sets of {self.size} more"
-        return f"{self.setting.headline()}: {self.now.verdict}, {found}"
+        return f"{self.setup.headline()}: {self.now.verdict}, {found}"
 
     verdict = Shown(Word, lambda self: self.now.verdict)
     rank = Shown(int, lambda self: self.now.rank)
     dof = Shown(int, lambda self: self.now.dof)
-    lost = Shown(tuple[Freedom, ...], lambda self: self.now.lost)
+    unobserved = Shown(tuple[Freedom, ...], lambda self: self.now.unobserved)
 
 
 @analysis(
@@ -285,26 +288,26 @@ def advise(
     robot = as_robot(robot)
     length = (robot if isinstance(robot, Mechanism) else robot.robot).length
     offered = [each for text in as_texts(offer) for one in split_offers(text) for each in offers(one, length)]
-    setting = ObservedRobot.of(robot, observe, camera, see=see, offer=offered or None, seed=seed)
+    setup = ObservedRobot.of(robot, observe, camera, see=see, offer=offered or None, seed=seed)
     prices = _prices(price)
-    now = verdict_of(setting, setting.labels, setting.samples)
+    now = verdict_of(setup, setup.labels, setup.samples)
     if now.verdict in (CONTROLLABLE, AT_REST):
-        return Advice(setting, now, (), 0, True)
-    everything = candidates(setting, offered)
-    samples = setting.measuring((*setting.observed, *(each.observation for each in everything)))
-    search = Search(samples, len(setting.observed), everything)
+        return Advice(setup, now, (), 0, True)
+    all_samples = candidates(setup, offered)
+    samples = setup.measuring((*setup.observed, *(each.observation for each in all_samples)))
+    search = Search(samples, len(setup.observed), all_samples)
     costs = [prices.get(_kind(each), 1.0) for each in search.useful]
     chosen, complete = search.cheapest(costs)
-    tell("verification")
+    report("verification")
     sets = _verify(
-        setting,
+        setup,
         samples,
         [(tuple(search.useful[i] for i in places), sum(costs[i] for i in places)) for places in chosen[:most]],
     )
     undecided = len(chosen[:most]) - len(sets)
     best = max((each.verdict.rank for each in sets), default=now.rank)
     kept = tuple(each for each in sets if each.verdict.rank == best)
-    return Advice(setting, now, kept, search.tried, complete and not undecided, undecided)
+    return Advice(setup, now, kept, search.tried, complete and not undecided, undecided)
 
 
 def _kind(measurement: FurtherMeasurement) -> str:
@@ -332,15 +335,15 @@ def _prices(text: str) -> dict[str, float]:
 
 
 def _verify(
-    setting: ObservedRobot, samples: Samples, sets: Sequence[tuple[tuple[FurtherMeasurement, ...], float]]
-) -> list[Cure]:
+    setup: ObservedRobot, samples: Samples, sets: Sequence[tuple[tuple[FurtherMeasurement, ...], float]]
+) -> list[SensorSuggestion]:
     """Each set with its price and its verdict at all samples; those whose rank has no clear gap are left out."""
-    found = list[Cure]()
+    found = list[SensorSuggestion]()
     for added, price in sets:
-        watched = (*setting.observed, *(each.observation for each in added))
+        watched = (*setup.observed, *(each.observation for each in added))
         try:
-            verdict = verdict_of(setting, setting.labels, restrict_samples(samples, watched, ways=False))
-            found.append(Cure(added, verdict, price))
+            verdict = verdict_of(setup, setup.labels, restrict_samples(samples, watched, ways=False))
+            found.append(SensorSuggestion(added, verdict, price))
         except RankUndecided:
             continue
     return found
@@ -353,9 +356,9 @@ class Search:
     ker C ⊂ ker T, T the twist's rows: what stays lost has dimension rank [C; T] − rank C.
     """
 
-    def __init__(self, samples: Samples, observed: int, everything: Sequence[FurtherMeasurement]) -> None:
+    def __init__(self, samples: Samples, observed: int, all_samples: Sequence[FurtherMeasurement]) -> None:
         self.tried = 0
-        kept: list[int] = list(range(len(everything)))
+        kept: list[int] = list(range(len(all_samples)))
         rates: list[list[Array]] = []
         self._twists: list[Array] = []
         unseen: list[list[Array]] = []
@@ -367,8 +370,8 @@ class Search:
             rates.append([found.basis[found.rows_of(observed + i)] for i in kept])
             unseen.append([block @ N for block in rates[-1]])
         kept = [i for i in kept if max(float(np.linalg.norm(blocks[i])) for blocks in unseen) > RANK_CUTOFF]
-        kept = _without_twins(kept, everything, rates)
-        self.useful = tuple(everything[i] for i in kept)
+        kept = _without_twins(kept, all_samples, rates)
+        self.useful = tuple(all_samples[i] for i in kept)
         self._rows = [
             np.array([_pad_rows(blocks[i]) for i in kept]).reshape(len(kept), LARGEST_VALUE, twist.shape[1])
             for blocks, twist in zip(unseen, self._twists, strict=True)
@@ -402,7 +405,7 @@ class Search:
             complete = complete and comb(count, size) <= LARGEST_COUNT
             sets = islice(combinations(range(count), size), LARGEST_COUNT)
             while batch := list(islice(sets, BATCH)):
-                tell(f"sets of {size}")
+                report(f"sets of {size}")
                 self.tried += len(batch)
                 costs = prices[np.array(batch)].sum(axis=1)
                 for each, rest, cost in zip(batch, self.count_lost(batch), costs, strict=True):
@@ -417,17 +420,17 @@ class Search:
 
 
 def _without_twins(
-    kept: Sequence[int], everything: Sequence[FurtherMeasurement], rates: Sequence[Sequence[Array]]
+    kept: Sequence[int], all_samples: Sequence[FurtherMeasurement], rates: Sequence[Sequence[Array]]
 ) -> list[int]:
     """Leave out a link's direction whose rates tell what a direction before it does (links joined by P joints only)."""
     spans = {
         i: [range_basis(blocks[i].T, 1.0)[0] for blocks in rates]
         for i in kept
-        if everything[i].kind in ("leg", "direction")
+        if all_samples[i].kind in ("leg", "direction")
     }
     left: list[int] = []
     for i in kept:
-        twins = (j for j in left if j in spans) if everything[i].kind == "direction" else ()
+        twins = (j for j in left if j in spans) if all_samples[i].kind == "direction" else ()
         if not any(
             all(largest_angle(a, b) < SAME_RELATION for a, b in zip(spans[i], spans[j], strict=True)) for j in twins
         ):

@@ -8,21 +8,21 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from ..batch.reach import grid_dependence, sweep
-from ..errors import BadMechanism, NoPlatform, NoSegment, NotSampled, PlaneNotMet, PoseNotReached, RankUndecided
+from ..batch.pose_continuation import grid_dependence, sweep
+from ..errors import BadMechanism, NoPlatform, NoReachablePose, NoSegment, NotSampled, PoseNotReached, RankUndecided
 from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.operation_modes import STEPS, firmest, require_motions
 from ..kinematics.pinocchio_model import PinocchioModel
-from ..kinematics.sampled_mode import STEPS, firmest, require_motions
 from ..kinematics.walking import random_walk
 from ..mechanism import Mechanism
 from ..mechanism.pose import Grid, PoseLike, asked_poses
 from ..options import option
-from ..progress import tell
+from ..progress import report
 from ..records import FLAT, GAP, As, Recorded, Shown, Table, recorded
 from ..results import Result, Value
 from ..tolerances import RANK_GAP
-from .asked import asked_at, require_platform
-from .classes import Redundancy, list_redundant, usual_rows
+from .analysis_declaration import analysis
+from .configuration_report import ConfigurationAnalysis, ConfigurationReport
 from .observed import (
     POINTS,
     POSES,
@@ -31,14 +31,14 @@ from .observed import (
     LegsLike,
     Mobility,
     MobilityWritten,
+    ObservedAxis,
     ObservedRobot,
     RobotLike,
     Seed,
     SeeLike,
-    WatchedAxis,
 )
-from .posture import ConfigurationAnalysis, Posture
-from .question import analysis
+from .pose_requests import asked_at, require_platform
+from .singularity_indices import Redundancy, list_redundant, usual_rows
 
 UNREACHABLE = "unreachable"
 MEASURES = ("type2", "type1", "constraints", "condition", "mm_per_degree", "degrees_per_degree")
@@ -49,7 +49,7 @@ class GridCheck(Value):
     """The postures over a grid of poses, in its order; None where a pose is not reached."""
 
     grid: Annotated[Grid, FLAT]
-    postures: tuple[Posture | None, ...]
+    postures: tuple[ConfigurationReport | None, ...]
     free: Recorded[tuple[str, ...]]
     """The parts of the pose that are neither varied nor held."""
     dependent: str | None = None
@@ -90,8 +90,8 @@ class Check(Result, shown_as="check"):
     """What is observed, the postures at the requested poses, and the loop constraints that are redundant at
     generic ones."""
 
-    setting: Annotated[ObservedRobot, FLAT]
-    postures: Annotated[tuple[Posture, ...], As("configurations")]
+    setup: Annotated[ObservedRobot, FLAT]
+    postures: Annotated[tuple[ConfigurationReport, ...], As("configurations")]
     redundant: Recorded[tuple[Redundancy, ...]]
     grid: Recorded[GridCheck | None] = None
     unreached: tuple[PoseNotReached, ...] = ()
@@ -101,36 +101,36 @@ class Check(Result, shown_as="check"):
     @recorded(As("characteristic_length"))
     def length(self) -> float:
         """The characteristic length (m) that makes lengths comparable with angles."""
-        return self.setting.everything.twin.length
+        return self.setup.all_samples.model.length
 
     @property
     def as_written(self) -> Mobility | None:
         """The mobility of the file's own links and joints, None where no samples of them can be drawn."""
-        return self.setting.mobility_if_written
+        return self.setup.mobility_if_written
 
     def require_answered(self, at: Any = None, **asked: Any) -> None:
         """Raise ``RankUndecided`` and ``PoseNotReached`` at poses that were asked for."""
         for posture in self.postures if at else ():
             if not posture.decided:
-                raise RankUndecided(f"{self.setting.robot.name} at {posture.pose}", posture.gap, RANK_GAP)
+                raise RankUndecided(f"{self.setup.robot.name} at {posture.pose}", posture.gap, RANK_GAP)
         if self.unreached:
             raise PoseNotReached.of_all(self.unreached)
 
     def headline(self) -> str:
         """The robot, and the state of its hidden robot at each pose."""
-        dof, states = self.setting.dof, list[str]()
+        dof, states = self.setup.dof, list[str]()
         for each in self.postures:
             rank = each.hidden.rank
             states.append(f"{each.pose} {each.hidden.state}" + ("" if rank == dof else f", shows {rank} of {dof}"))
         states += [f"{each.pose} not reached" for each in self.unreached]
-        return f"{self.setting.headline()}: {'; '.join(states)}"
+        return f"{self.setup.headline()}: {'; '.join(states)}"
 
     unreached_record = Shown(
         list[Unreached], lambda self: [Unreached(each.pose, each.reason) for each in self.unreached], As("unreached")
     )
-    watched = Shown(list[WatchedAxis], lambda self: self.setting.watched_record)
-    mobility = Shown(MobilityWritten, lambda self: self.setting.mobilities)
-    unlimited = Shown(list[str], lambda self: self.setting.unlimited, UNLIMITED)
+    observations = Shown(list[ObservedAxis], lambda self: self.setup.observed_record)
+    mobility = Shown(MobilityWritten, lambda self: self.setup.mobilities)
+    limits_ignored = Shown(list[str], lambda self: self.setup.limits_ignored, UNLIMITED)
 
 
 class LoopMobility(NamedTuple):
@@ -147,8 +147,8 @@ class LoopRank(NamedTuple):
     rows: Annotated[int, "constraints of the loops"]
     rank: Annotated[int, "how many of them are independent"]
     gap: Annotated[float, GAP]
-    weakest: Annotated[float, "the smallest singular value that counts, as part of the largest"]
-    dropped: Annotated[float, "the largest that does not count, as part of the largest: rounding at least"]
+    smallest_kept: Annotated[float, "the smallest singular value that counts, as part of the largest"]
+    largest_dropped: Annotated[float, "the largest that does not count, as part of the largest: rounding at least"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -165,16 +165,16 @@ class LoopCheck(Result, shown_as="loop_check"):
     @classmethod
     def of(cls, robot: Mechanism, why: str) -> LoopCheck:
         """That of a mechanism, and ``why`` no more can be said; raises ``NotSampled``, ``RankUndecided``, ``Shaky``."""
-        twin = PinocchioModel(robot)
-        start = ClosedConfiguration.of(twin, twin.q0)
-        names, sizes = twin.blocks
+        model = PinocchioModel(robot)
+        start = ClosedConfiguration.of(model, model.q0)
+        names, sizes = model.blocks
         moves = bool(names) and start.kernel()[0].shape[1] > 0
         found = list(random_walk(start, 2 * STEPS, steps=STEPS)) if moves else [start]
         if moves:
             require_motions(found)
         kernel, rank = firmest(found).kernel()
         rank.decided(f"{robot.name}: the constraints of its loops")
-        told = LoopRank(names, twin.nv, sum(sizes), rank.value, rank.gap, rank.weakest, rank.dropped)
+        told = LoopRank(names, model.nv, sum(sizes), rank.value, rank.gap, rank.weakest, rank.dropped)
         redundant = list_redundant(usual_rows(found), generic=True)
         more = (why, *([robot.proposed_motors] if robot.proposed_motors else []))
         return cls(robot, LoopMobility(kernel.shape[1]), told, redundant, more)
@@ -239,8 +239,8 @@ def check(
     of them are redundant; and what it takes to say ``more``.
 
     Of several poses, those out of reach are listed in ``unreached``. Raises ``BadRequest`` for unknown names and for
-    parts of a pose that the platform cannot change, ``PoseNotReached`` if no pose is reached, ``PlaneNotMet`` if none
-    of a grid is.
+    parts of a pose that the platform cannot change, ``PoseNotReached`` if no pose is reached, ``NoReachablePose`` if
+    none of a grid is.
 
     >>> hrsynth.check("3rrr_m1", at=["x=0,y=0,phi=0", [0.01, 0, 0]])
     <Check: 3rrr_m1, watching 1, 2, 3: x=0,y=0,z=0,phi=0deg regular; x=0.01,y=0,z=0,phi=0deg regular>
@@ -248,31 +248,31 @@ def check(
     poses = asked_poses(at)
     cells = None if grid is None else Grid.parse(grid)
     try:
-        setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed).telling(poses)
+        setup = ObservedRobot.of(robot, observe, camera, see=see, seed=seed).telling(poses)
     except (NoPlatform, NoSegment, BadMechanism, NotSampled) as error:
         if not isinstance(robot, Mechanism) or poses or any(each is not None for each in (cells, observe, camera, see)):
             raise
         return LoopCheck.of(robot, str(error).removeprefix(f"{robot.file or robot.name}: "))
-    examiner = ConfigurationAnalysis.of(setting)
-    start, question, motion = setting.everything.start, setting.everything.question, setting.motion
-    found = asked_at(setting, poses) or [start]
+    examiner = ConfigurationAnalysis.of(setup)
+    start, observation_model, motion = setup.all_samples.start, setup.all_samples.observation_model, setup.motion
+    found = asked_at(setup, poses) or [start]
     configurations = [each for each in found if isinstance(each, ClosedConfiguration)]
     unreached = tuple(each for each in found if isinstance(each, PoseNotReached))
     if not configurations:
         raise PoseNotReached.of_all(unreached)
-    tell("poses")
+    report("poses")
     postures = tuple(map(examiner.examine, configurations))
     swept = None
     if cells is not None:
-        require_platform(setting.robot, cells)
-        places = sweep(start, question, cells, motion, setting.placer)
+        require_platform(setup.robot, cells)
+        places = sweep(start, observation_model, cells, motion, setup.placer)
         dependent = None if all(places) else grid_dependence(start, motion, cells)
         if not any(places):
-            raise PlaneNotMet(setting.robot.name, f"the grid {cells}", f"none of {len(places)} is", dependent)
+            raise NoReachablePose(setup.robot.name, f"the grid {cells}", f"none of {len(places)} is", dependent)
         swept = GridCheck(
             cells,
             tuple(None if each is None else examiner.classify(each) for each in places),
             motion.free({*cells.names, *cells.fixed.given}),
             dependent,
         )
-    return Check(setting, postures, list_redundant(examiner.redundant, generic=True), swept, unreached)
+    return Check(setup, postures, list_redundant(examiner.redundant, generic=True), swept, unreached)

@@ -11,25 +11,25 @@ from typing import Annotated, NamedTuple
 from ..kinematics.sampling import Samples
 from ..mechanism.observation import labels_of
 from ..mechanism.pose import asked_pose
-from ..progress import tell
+from ..progress import report
 from ..records import FLAT, As, Recorded, Shown, recorded
 from ..results import Result
-from .asked import observe as observed
+from .analysis_declaration import analysis
 from .exact import ExactVerdict, architecture
 from .observed import (
     BeginPose,
     CameraLike,
     LegsLike,
+    ObservedAxis,
     ObservedRobot,
     OperationModeRecord,
     OtherMode,
     RobotLike,
     Seed,
     SeeLike,
-    WatchedAxis,
     restrict_samples,
 )
-from .question import analysis
+from .pose_requests import observe as observed
 from .verdict import Verdict, verdict_of
 
 LARGEST_COMPLETE = 10
@@ -52,7 +52,7 @@ class LegSet(NamedTuple):
 class Legs(Result, shown_as="legs"):
     """The verdict of every set of observed legs, and the smallest sets of the best rank."""
 
-    setting: ObservedRobot
+    setup: ObservedRobot
     robot: Recorded[str]
     architecture: Annotated[str, As("architecture_ascii")]
     dof: Recorded[int]
@@ -83,9 +83,9 @@ class Legs(Result, shown_as="legs"):
         """The sets, each with what generic geometry of the same architecture sees."""
         return [LegSet(each, exact.exact, exact) for each, exact in zip(self.sets, self.exact, strict=True)]
 
-    watched = Shown(list[WatchedAxis], lambda self: self.setting.watched_record)
-    operation_mode = Shown(OperationModeRecord, lambda self: self.setting.operation_mode)
-    other_modes = Shown(list[OtherMode], lambda self: self.setting.other_modes)
+    observations = Shown(list[ObservedAxis], lambda self: self.setup.observed_record)
+    operation_mode = Shown(OperationModeRecord, lambda self: self.setup.operation_mode)
+    other_modes = Shown(list[OtherMode], lambda self: self.setup.other_modes)
 
 
 def _smallest(labels: tuple[str, ...], rank: Callable[[tuple[str, ...]], int]) -> tuple[list[tuple[str, ...]], bool]:
@@ -145,19 +145,19 @@ def legs(
     >>> hrsynth.legs("3rrr_m1").minimal
     (('1', '2', '3'),)
     """
-    setting = observed(robot, observe, camera, see=see, at=at, seed=seed)
-    anatomy = setting.anatomy
-    whole = observe is None and all(each.by_segment for each in setting.observed)
-    segments = setting.all_legs if whole else setting.observed
+    setup = observed(robot, observe, camera, see=see, at=at, seed=seed)
+    decomposition = setup.decomposition
+    whole = observe is None and all(each.by_segment for each in setup.observed)
+    segments = setup.all_legs if whole else setup.observed
     labels = labels_of(segments)
     sets, exact = list[Verdict](), list[ExactVerdict]()
-    generic = architecture(setting)
-    formation = setting.mechanism.formation
+    generic = architecture(setup)
+    formation = setup.mechanism.formation
     complete = len(labels) <= (LARGEST_FORMATION if formation else LARGEST_COMPLETE)
     few = 1 if formation else 3
 
     def samples_of(chosen: tuple[str, ...]) -> Samples:
-        return restrict_samples(setting.everything, [each for each in segments if each.leg in chosen], ways=False)
+        return restrict_samples(setup.all_samples, [each for each in segments if each.leg in chosen], ways=False)
 
     def rank(chosen: tuple[str, ...]) -> int:
         return max(member.relation.rank for member in samples_of(chosen).members)
@@ -174,17 +174,17 @@ def legs(
         tried = sorted({*tried, *found}, key=lambda each: (len(each), [labels.index(label) for label in each]))
     for chosen in tried:
         samples = samples_of(chosen)
-        sets.append(verdict_of(setting, chosen, samples))
-        exact.append(generic.verdict(samples.question.observations))
-        tell("sets of legs")
+        sets.append(verdict_of(setup, chosen, samples))
+        exact.append(generic.verdict(samples.observation_model.observations))
+        report("sets of legs")
     best = max(each.rank for each in sets)
     smallest = min(len(each.legs) for each in sets if each.rank == best)
     minimal = tuple(each.legs for each in sets if best and each.rank == best and len(each.legs) == smallest)
     return Legs(
-        setting,
-        setting.robot.name,
-        anatomy.architecture().ascii,
-        setting.dof,
+        setup,
+        setup.robot.name,
+        decomposition.architecture().ascii,
+        setup.dof,
         tuple(sets),
         tuple(exact),
         complete,

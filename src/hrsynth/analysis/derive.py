@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 import numpy as np
 
 from ..description.tree import spanning
-from ..errors import BadMechanism, BadRequest, NotCertified
+from ..errors import BadMechanism, BadRequest, NoEquivalentRobot
 from ..geometry.ranks import range_basis
 from ..geometry.vectors import Array
-from ..kinematics.certificate import Certificate, certify
+from ..kinematics.equivalence import EquivalenceCheck, check_equivalence
 from ..kinematics.sampling import Samples
 from ..mechanism import Mechanism
 from ..mechanism.legs import LegDecomposition, decompose
@@ -20,14 +20,14 @@ from ..mechanism.normal import normal_form
 from ..mechanism.notation import Architecture
 from ..mechanism.observations.direction import Direction
 from ..options import option
-from ..progress import tell
+from ..progress import report
 from ..records import ANGLE, FLAT, As, Recorded, Shown, recorded
 from ..results import Result, Value
 from ..rewrite.evidence import Evidence
 from ..rewrite.state import State
-from ..rewrite.strategy import FORMS, GENERAL, OBSERVED_STAGES, Check, Rewriting, Step, Strategy, trusting
+from ..rewrite.strategy import FORMS, GENERAL, OBSERVED_STAGES, Check, Rewriting, Step, Strategy, apply_unchecked
 from ..tolerances import SAME_RELATION
-from .asked import observe as observed_robot
+from .analysis_declaration import analysis
 from .exact import ExactVerdict
 from .exact import architecture as exact_architecture
 from .freedoms import Freedom, name_freedoms
@@ -45,7 +45,7 @@ from .observed import (
     Seed,
     SeeLike,
 )
-from .question import analysis
+from .pose_requests import observe as observed_robot
 from .verdict import Verdict, verdict_of
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ class Derivation(Result, shown_as="derive"):
     """A robot, what is observed, its hidden robot (None if every leg is blind), how it was derived, and the proof."""
 
     robot: Mechanism
-    setting: Annotated[ObservedRobot, FLAT]
+    setup: Annotated[ObservedRobot, FLAT]
     form: Annotated[str, Literal["simplified", "general"]]
     architecture: Architecture
     hidden: Mechanism | None
@@ -95,14 +95,14 @@ class Derivation(Result, shown_as="derive"):
     """What generic geometry of the same architecture sees."""
     taken: tuple[Step, ...]
     """All attempts; those of the observed legs were compared with the real robot all together."""
-    certificate: Recorded[Certificate]
+    equivalence: Recorded[EquivalenceCheck]
     unchecked: Annotated[UncheckedForm | None, As("unchecked_form")]
 
     @cached_property
     @recorded()
     def steps(self) -> tuple[Step, ...]:
         """All attempts, each compared separately with the real robot."""
-        check = _check(self.setting.samples, STEP_SAMPLES)
+        check = _check(self.setup.samples, STEP_SAMPLES)
         return tuple(step.measured(check) for step in self.taken)
 
     @property
@@ -116,16 +116,16 @@ class Derivation(Result, shown_as="derive"):
     @recorded()
     def dof(self) -> int:
         """The robot's dof."""
-        return self.setting.dof
+        return self.setup.dof
 
     @property
     def mobility(self) -> Mobility:
         """Mobility of the normal form."""
-        return self.setting.mobility
+        return self.setup.mobility
 
     def headline(self) -> str:
         """The robot, the legs watched, the hidden robot and the verdict."""
-        legs = ", ".join(self.setting.labels)
+        legs = ", ".join(self.setup.labels)
         return (
             f"{self.robot.name} {self.architecture}, watching {legs}: "
             f"hidden robot {self.hidden_architecture or 'none'}, {self.verdict.verdict}"
@@ -136,7 +136,7 @@ class Derivation(Result, shown_as="derive"):
         lists them."""
         from .modes.modes import modes
 
-        return modes(self.setting, at=at, real=real)
+        return modes(self.setup, at=at, real=real)
 
     @property
     @recorded()
@@ -148,10 +148,10 @@ class Derivation(Result, shown_as="derive"):
         return Notation(real.unicode, hidden.unicode, real.ascii, hidden.ascii, hidden.latex)
 
     verdict_record = Shown(Verdict, lambda self: self.verdict, As(flat=True, without=("legs", "gap")))
-    mobility_record = Shown(MobilityWritten, lambda self: self.setting.mobilities, As("mobility"))
-    point_platform = Shown(bool, lambda self: self.setting.anatomy.point is not None)
-    operation_mode = Shown(OperationModeRecord, lambda self: self.setting.operation_mode)
-    other_modes = Shown(list[OtherMode], lambda self: self.setting.other_modes)
+    mobility_record = Shown(MobilityWritten, lambda self: self.setup.mobilities, As("mobility"))
+    point_platform = Shown(bool, lambda self: self.setup.decomposition.point is not None)
+    operation_mode = Shown(OperationModeRecord, lambda self: self.setup.operation_mode)
+    other_modes = Shown(list[OtherMode], lambda self: self.setup.other_modes)
 
 
 @analysis(
@@ -188,7 +188,7 @@ def derive(
     (:func:`hrsynth.observe`); ``at`` is a pose that replaces the zero configuration, in another operation mode if
     necessary, or one of its modes (``mode:2``); an observed robot already has all of that. ``form`` is ``simplified``
     or ``general``; ``unchecked``: also give the form of unchecked rules. Raises ``BadRequest`` for unknown names,
-    ``NotCertified`` if even the exact lift fails.
+    ``NoEquivalentRobot`` if even the exact lift fails.
 
     >>> found = hrsynth.derive("3rrr_m1", [1, 2, 3])
     >>> found
@@ -198,34 +198,34 @@ def derive(
     """
     if form not in FORMS:
         raise BadRequest("unknown form", form, tuple(FORMS))
-    setting = observed_robot(robot, observe, camera, see=see, at=at, seed=seed)
-    anatomy, samples = setting.anatomy, setting.samples
-    verdict = verdict_of(setting, setting.labels, samples)
-    exact = exact_architecture(setting).verdict(setting.observed)
-    evidence = Evidence(anatomy, samples)
+    setup = observed_robot(robot, observe, camera, see=see, at=at, seed=seed)
+    decomposition, samples = setup.decomposition, setup.samples
+    verdict = verdict_of(setup, setup.labels, samples)
+    exact = exact_architecture(setup).verdict(setup.observed)
+    evidence = Evidence(decomposition, samples)
 
     for trusted in (OBSERVED_STAGES, ()):
         result = FORMS[form](Rewriting.of(evidence, _check(samples, STEP_SAMPLES), trusted))
-        hidden, certificate = _certify(setting, result.state, samples)
+        hidden, certificate = _certify(setup, result.state, samples)
         if hidden is not None and certificate.passed and result.virtual_only:
             break
     architecture: Architecture | None = None
     without_checks = None
     if hidden is not None:
         if not (certificate.passed and result.virtual_only):
-            result, hidden, certificate = _fallback(setting, evidence, samples, certificate, FORMS[form])
+            result, hidden, certificate = _fallback(setup, evidence, samples, certificate, FORMS[form])
         architecture = result.state.architecture()
-        segments = all(each.by_segment for each in setting.observed)
+        segments = all(each.by_segment for each in setup.observed)
         if unchecked and form == "simplified" and architecture is not None and segments:
-            tell("the unchecked form")
-            without_checks = _unchecked_form(setting, evidence, samples, architecture, certificate)
+            report("the unchecked form")
+            without_checks = _unchecked_form(setup, evidence, samples, architecture, certificate)
     elif not certificate.passed:
-        raise NotCertified(setting.robot.name, certificate.largest_angle, SAME_RELATION)
+        raise NoEquivalentRobot(setup.robot.name, certificate.largest_angle, SAME_RELATION)
     return Derivation(
-        setting.robot,
-        setting,
+        setup.robot,
+        setup,
         form,
-        anatomy.architecture(),
+        decomposition.architecture(),
         hidden,
         architecture,
         verdict,
@@ -236,32 +236,32 @@ def derive(
     )
 
 
-def _certify(setting: ObservedRobot, state: State, samples: Samples) -> tuple[Mechanism | None, Certificate]:
+def _certify(setup: ObservedRobot, state: State, samples: Samples) -> tuple[Mechanism | None, EquivalenceCheck]:
     """The hidden robot, None where every leg is blind, and its certificate at all samples."""
     if not state.actuators:
         return None, _blind(samples)
-    tell("certificate")
-    hidden = finish_robot(setting, state)
-    return hidden, certify(samples, hidden)
+    report("certificate")
+    hidden = finish_robot(setup, state)
+    return hidden, check_equivalence(samples, hidden)
 
 
-def finish_robot(setting: ObservedRobot, state: State) -> Mechanism:
+def finish_robot(setup: ObservedRobot, state: State) -> Mechanism:
     """The hidden robot as a file writes it: a spanning tree, names of its own, its observations; its platform turns
     where the real one does. Of a formation, whose bodies are joined now, the first one is the platform."""
     mechanism = state.mechanism
-    observations = tuple(o for o in setting.observed if {o.link, o.seen_from or o.link} <= mechanism.links.keys())
+    observations = tuple(o for o in setup.observed if {o.link, o.seen_from or o.link} <= mechanism.links.keys())
     cameras = tuple(camera for camera in mechanism.cameras if camera.link in mechanism.links)
     hidden = spanning(
         replace(
             mechanism,
-            name=f"{setting.robot.name}_hidden",
+            name=f"{setup.robot.name}_hidden",
             observations=observations,
             cameras=cameras,
             file=None,
             formation=False,
         )
     )
-    return _as_legs(hidden, turns=setting.samples.question.point is None)
+    return _as_legs(hidden, turns=setup.samples.observation_model.point is None)
 
 
 def _as_legs(hidden: Mechanism, turns: bool) -> Mechanism:
@@ -273,35 +273,35 @@ def _as_legs(hidden: Mechanism, turns: bool) -> Mechanism:
         for o in hidden.observations
     )
     try:
-        anatomy = decompose(normal_form(replace(hidden, observations=told, turns=None)).mechanism)
+        decomposition = decompose(normal_form(replace(hidden, observations=told, turns=None)).mechanism)
     except BadMechanism:
         return hidden
     observations = tuple(
-        own if anatomy.leg_of(own.link) else other for own, other in zip(hidden.observations, told, strict=True)
+        own if decomposition.leg_of(own.link) else other for own, other in zip(hidden.observations, told, strict=True)
     )
-    return replace(hidden, observations=observations, turns=None if turns == (anatomy.point is None) else turns)
+    return replace(hidden, observations=observations, turns=None if turns == (decomposition.point is None) else turns)
 
 
 def _check(samples: Samples, count: int | None) -> Check:
     """The check of a single step, at the first ``count`` samples (None: at all)."""
-    return lambda mechanism, bodies: certify(samples, mechanism, count=count, bodies=bodies, complete=False)
+    return lambda mechanism, bodies: check_equivalence(samples, mechanism, count=count, bodies=bodies, complete=False)
 
 
 def _fallback(
-    setting: ObservedRobot, evidence: Evidence, samples: Samples, failed: Certificate, asked: Strategy
-) -> tuple[Rewriting, Mechanism, Certificate]:
+    setup: ObservedRobot, evidence: Evidence, samples: Samples, failed: EquivalenceCheck, asked: Strategy
+) -> tuple[Rewriting, Mechanism, EquivalenceCheck]:
     """Where the certificate at all samples sees what three did not: check every step of the form that was asked for at
     all samples, then of the general form."""
     for run in dict.fromkeys((asked, GENERAL)):
         again = run(Rewriting.of(evidence, _check(samples, None)))
-        hidden = finish_robot(setting, again.state)
-        certificate = certify(samples, hidden)
+        hidden = finish_robot(setup, again.state)
+        certificate = check_equivalence(samples, hidden)
         if certificate.passed and again.virtual_only:
             return again, hidden, certificate
-    raise NotCertified(setting.robot.name, failed.largest_angle, SAME_RELATION)
+    raise NoEquivalentRobot(setup.robot.name, failed.largest_angle, SAME_RELATION)
 
 
-def _blind(samples: Samples) -> Certificate:
+def _blind(samples: Samples) -> EquivalenceCheck:
     """What is certified where every leg is blind: the directions do not move at all."""
     angle = max(
         float(np.linalg.norm(member.relation.rates, 2)) if member.relation.dimension else 0.0
@@ -310,31 +310,31 @@ def _blind(samples: Samples) -> Certificate:
     gap = min(member.relation.gap for member in samples.members)
     passed = angle <= SAME_RELATION
     reason = "u̇ vanishes: every observed direction is constant" if passed else "an observed direction moves"
-    return Certificate(len(samples.members), samples.discarded, angle, gap, 0.0, passed, reason)
+    return EquivalenceCheck(len(samples.members), samples.discarded, angle, gap, 0.0, passed, reason)
 
 
 def _unchecked_form(
-    setting: ObservedRobot, evidence: Evidence, samples: Samples, certified: Architecture, certificate: Certificate
+    setup: ObservedRobot, evidence: Evidence, samples: Samples, certified: Architecture, certificate: EquivalenceCheck
 ) -> UncheckedForm:
     """Apply the rules without checking their conditions, and compare what they give with the real robot.
 
     The ends of the legs are changed only where the hidden robot would not keep its dof otherwise (MMT 3.2).
     """
-    dof = setting.dof
+    dof = setup.dof
     planar = _planar(samples)
-    change = dof < (3 if planar else 6) and len(samples.question.observations) < len(setting.anatomy.legs)
-    tried: list[tuple[Certificate, Architecture]] = []
-    for rewriting in trusting(evidence, change_ends=change):
+    change = dof < (3 if planar else 6) and len(samples.observation_model.observations) < len(setup.decomposition.legs)
+    tried: list[tuple[EquivalenceCheck, Architecture]] = []
+    for rewriting in apply_unchecked(evidence, change_ends=change):
         architecture = rewriting.state.architecture()
         if architecture == certified:
             return UncheckedForm(architecture, True, certificate.largest_angle, reason="it is the certified form")
-        found = certify(samples, rewriting.state.mechanism, count=STEP_SAMPLES, complete=False)
+        found = check_equivalence(samples, rewriting.state.mechanism, count=STEP_SAMPLES, complete=False)
         if found.passed:
             reason = "equivalent, but not the simplest form"
             return UncheckedForm(architecture, True, found.largest_angle, reason=reason)
         tried.append((found, architecture))
     found, architecture = min(reversed(tried), key=lambda pair: pair[0].largest_angle)
-    gains, loses = _exchanged_freedoms(setting.anatomy, found)
+    gains, loses = _exchanged_freedoms(setup.decomposition, found)
     return UncheckedForm(architecture, False, found.largest_angle, gains, loses, found.reason)
 
 
@@ -347,7 +347,7 @@ def _planar(samples: Samples) -> bool:
 
 
 def _exchanged_freedoms(
-    anatomy: LegDecomposition, found: Certificate
+    decomposition: LegDecomposition, found: EquivalenceCheck
 ) -> tuple[tuple[Freedom, ...], tuple[Freedom, ...]]:
     """The platform's freedoms that a wrong hidden robot gains and loses, at the configuration where they differ."""
     if found.mismatch is None or found.mismatch.real.twist_rows != 6:
@@ -356,7 +356,7 @@ def _exchanged_freedoms(
 
     def beyond(inner: Array, outer: Array) -> tuple[Freedom, ...]:
         rest = range_basis(inner - outer @ (outer.T @ inner), 1.0)[0]
-        return name_freedoms(rest, anatomy, position=position)
+        return name_freedoms(rest, decomposition, position=position)
 
     gains, loses = beyond(hidden.twists, real.twists), beyond(real.twists, hidden.twists)
     if not gains and not loses:

@@ -30,20 +30,20 @@ import numpy as np
 from ..batch.platform_coordinates import frames_at
 from ..budgets import LARGEST_RANDOM, REMEMBERED
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.relation import Measurement, Relation
+from ..kinematics.velocity_relation import ObservationModel, VelocityRelation
 from ..mechanism import Mechanism, Observation
-from ..mechanism.carried import Tie, carried_by_joints, ties
+from ..mechanism.incidences import Incidences, recognise
 from ..mechanism.model import JointType
 from ..mechanism.observation import labels_of
 from ..mechanism.observations.direction import SeenAxis
-from ..mechanism.relations import Relations, recognise
+from ..mechanism.structural_incidences import GeometricIncidence, carried_by_joints, ties
 from ..records import OPTIONAL, As, Record, Recorded, Word
 from ..results import Compared, finite
 from ..tolerances import CLOSED
 from .formation import PLACES, following, sense_links
 from .formation import word as formation_word
 from .instances import Instance, NotRecognised, draw, instance, kernel, random_numbers, rank, ranks_at
-from .kept import are_kept, degree
+from .loop_invariants import are_kept, degree
 from .observed import ObservedRobot, select_relation
 from .sensor_rows import DEGREE, SensorPlaces, has_exact_rates
 from .verdict import word
@@ -59,19 +59,27 @@ class Basis(Record):
     """What the relations of an architecture rest on: how many are ``carried`` by links and joints, how many closed
     loops keep besides, and those merely ``observed``, in words."""
 
-    carried: Recorded[int]
-    kept: Recorded[int]
-    observed: Recorded[tuple[str, ...]]
-    held: Annotated[float, As("largest_defect_held")] = 0.0
+    structural: Recorded[int]
+    loop_invariant: Recorded[int]
+    sampled: Recorded[tuple[str, ...]]
+    largest_defect_held: Annotated[float, As("largest_defect_held")] = 0.0
     """The largest defect (sines, characteristic lengths) of a relation that counts as held."""
-    missed: Annotated[float | None, As("smallest_defect_not_held")] = None
+    smallest_defect_not_held: Annotated[float | None, As("smallest_defect_not_held")] = None
     """The smallest one of a relation that nearly holds and does not count."""
 
     @property
     def nearly(self) -> str:
         """What nearly holds, or holds only nearly, in words; empty where nothing does."""
-        text = f"; relations that miss by up to {self.held:.1e} count as held" if self.held > CLOSED else ""
-        return text + ("" if self.missed is None else f"; a relation misses by {self.missed:.1e} and does not count")
+        text = (
+            f"; relations that miss by up to {self.largest_defect_held:.1e} count as held"
+            if self.largest_defect_held > CLOSED
+            else ""
+        )
+        return text + (
+            ""
+            if self.smallest_defect_not_held is None
+            else f"; a relation misses by {self.smallest_defect_not_held:.1e} and does not count"
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -107,9 +115,9 @@ class ExactArchitecture:
     def __init__(
         self,
         mechanism: Mechanism,
-        relations: Relations,
+        relations: Incidences,
         observations: Sequence[Observation],
-        relation: Relation,
+        relation: VelocityRelation,
         start: int | None = None,
     ) -> None:
         self.mechanism = mechanism
@@ -158,16 +166,16 @@ class ExactArchitecture:
             seen, instances = self._rank(observed)
             basis = self.basis
             trivial = self._trivial(observed) if self.mechanism.formation else None
-            chance = self._chance(observed) if seen == self.dof > 0 and not basis.observed else 0.0
+            chance = self._chance(observed) if seen == self.dof > 0 and not basis.sampled else 0.0
         except NotRecognised as error:
             return ExactVerdict(legs, None, None, self.dof, False, 0, str(error))
-        proved = seen == self.dof and not basis.observed and (self.dof > 0 or trivial is not None)
+        proved = seen == self.dof and not basis.sampled and (self.dof > 0 or trivial is not None)
         random = f"exact at {instances} random instance" + "s" * (instances > 1)
         reason = "proved in exact arithmetic" if proved else random
         if chance:
             reason += f", except for a chance below {power_above(chance)}"
-        if basis.observed:
-            reason += f" of geometry with {len(basis.observed)} relations observed at samples ({basis.observed[0]})"
+        if basis.sampled:
+            reason += f" of geometry with {len(basis.sampled)} relations observed at samples ({basis.sampled[0]})"
         reason += basis.nearly
         said = word(seen, self.dof) if trivial is None else formation_word(self.dof - seen - trivial)
         return ExactVerdict(legs, said, seen, self.dof, True, instances, reason, proved, chance, basis, trivial)
@@ -215,7 +223,7 @@ class ExactArchitecture:
             raise NotRecognised("its geometry is not recognised: it is more special than its relations say")
         return False
 
-    def _all_kept(self, every: Sequence[Tie]) -> bool:
+    def _all_kept(self, every: Sequence[GeometricIncidence]) -> bool:
         """Whether the motions of each of some instances keep all relations."""
         return all(all(are_kept(every, self.relations, self.instance(i))) for i in range(TESTS))
 
@@ -224,7 +232,9 @@ class ExactArchitecture:
         places = [self._places[o.key] for o in observed]
         found = [self.instance(0)]
         spins = sum(self._spins(link, places) for link in self.mechanism.links)
-        tested = self.basis.kept + bool(self.basis.kept)  # each relation, and that the rank of A is the largest on F
+        tested = self.basis.loop_invariant + bool(
+            self.basis.loop_invariant
+        )  # each relation, and that the rank of A is the largest on F
         if found[0].mobility - found[0].ranks(places)[0] != spins:
             tested += 1
             found += [self.instance(i) for i in range(1, TESTS)]
@@ -282,22 +292,25 @@ class ExactArchitecture:
 
 
 @lru_cache(maxsize=REMEMBERED)
-def architecture(setting: ObservedRobot) -> ExactArchitecture:
+def architecture(setup: ObservedRobot) -> ExactArchitecture:
     """The architecture of a robot, from its zero configuration and its samples."""
-    everything = setting.everything
-    at = [everything.start, *setting.configurations]
-    return architecture_of(setting.mechanism, everything.question, at, everything.members[0].relation)
+    all_samples = setup.all_samples
+    at = [all_samples.start, *setup.configurations]
+    return architecture_of(setup.mechanism, all_samples.observation_model, at, all_samples.members[0].relation)
 
 
 def architecture_of(
-    mechanism: Mechanism, question: Measurement, at: Sequence[ClosedConfiguration], relation: Relation
+    mechanism: Mechanism,
+    observation_model: ObservationModel,
+    at: Sequence[ClosedConfiguration],
+    relation: VelocityRelation,
 ) -> ExactArchitecture:
     """The architecture of a mechanism from configurations ``at`` which relations must persist, and ρ at one of them."""
-    places = [i for i, o in enumerate(question.observations) if has_exact_rates(o)]
-    observed = [question.observations[i] for i in places]
+    places = [i for i, o in enumerate(observation_model.observations) if has_exact_rates(o)]
+    observed = [observation_model.observations[i] for i in places]
     sensors = SensorPlaces.of(observed, mechanism)
     directions = [*(o for o in observed if isinstance(o, SeenAxis)), *sensors.as_observed()]
-    relations = recognise(mechanism, frames_at(at), directions, question.point, sensors.points)
+    relations = recognise(mechanism, frames_at(at), directions, observation_model.point, sensors.points)
     return ExactArchitecture(
         mechanism, relations, observed, select_relation(relation, places), at[0].kernel()[0].shape[1]
     )

@@ -19,11 +19,11 @@ from ..geometry.ranks import kernel_basis, range_basis
 from ..geometry.screws import rotation, translation
 from ..geometry.vectors import Array, Numbers, hat, orient_axis, rotation_about, unit
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.relation import Measurement, Relation
+from ..kinematics.velocity_relation import ObservationModel, VelocityRelation
 from ..mechanism import Observation
+from ..mechanism.cameras import CameraObservation, ViewGeometry
 from ..mechanism.legs import LegDecomposition
 from ..mechanism.observations.direction import SeenAxis
-from ..mechanism.sights import CameraObservation, Sighting
 from ..records import Recorded
 from ..results import Value
 from ..tolerances import NAMED
@@ -55,7 +55,7 @@ class Sensed:
 
 
 def sense_links(
-    seen: Observation, reference: str, at: Sighting, places: Sequence[tuple[Numbers, Numbers]]
+    seen: Observation, reference: str, at: ViewGeometry, places: Sequence[tuple[Numbers, Numbers]]
 ) -> Iterator[Sensed]:
     """What an observation senses of its two links; nothing beyond their relative motion where it has no wrenches (an
     encoder). ``places`` are points and directions where the other link might be."""
@@ -167,11 +167,14 @@ class Formation(Value):
 
 
 def formation_at(
-    at: ClosedConfiguration, question: Measurement, found: Relation, anatomy: LegDecomposition
+    at: ClosedConfiguration,
+    observation_model: ObservationModel,
+    found: VelocityRelation,
+    decomposition: LegDecomposition,
 ) -> Formation:
     """What ``found``, ρ at a configuration, leaves unseen."""
-    bodies, length = (question.platform, *question.others), at.twin.length
-    told, points = seen_at(at, question)
+    bodies, length = (observation_model.platform, *observation_model.others), at.model.length
+    told, points = seen_at(at, observation_model)
     centre = points.mean(axis=0) if len(points) else np.zeros(3)
     random = np.random.default_rng(0)
     places = [(AWAY * length * unit(random.normal(size=3)), unit(random.normal(size=3))) for _ in range(PLACES)]
@@ -179,7 +182,7 @@ def formation_at(
         _scale(part, length)
         for each, place in told
         for part in sense_links(
-            each, question.reference, replace(place, B=place.B - centre, C=place.C - centre), places
+            each, observation_model.reference, replace(place, B=place.B - centre, C=place.C - centre), places
         )
     ]
     K = found.unobserved_twists
@@ -201,18 +204,22 @@ def formation_at(
     trivial = range_basis(moved, 1.0)[0]
     return Formation(
         bodies,
-        _common_names(followed, points, centre, length, anatomy),
+        _common_names(followed, points, centre, length, decomposition),
         _flexes(K, K @ trivial, bodies),
         group=Similarities.of(followed, centre, length),
     )
 
 
-def seen_at(at: ClosedConfiguration, question: Measurement) -> tuple[list[tuple[Observation, Sighting]], Array]:
+def seen_at(
+    at: ClosedConfiguration, observation_model: ObservationModel
+) -> tuple[list[tuple[Observation, ViewGeometry]], Array]:
     """The observations that sense anything, each with where it is, and all points that are sensed (n, 3)."""
-    found = list[tuple[Observation, Sighting]]()
-    for each in question.observations:
+    found = list[tuple[Observation, ViewGeometry]]()
+    for each in observation_model.observations:
         if isinstance(each, CameraObservation | SeenAxis):
-            found.append((each, each.sighting(at.pose(each.seen_from or question.reference), at.pose(each.link))))
+            found.append(
+                (each, each.sighting(at.pose(each.seen_from or observation_model.reference), at.pose(each.link)))
+            )
     points = [P for each, place in found if isinstance(each, CameraObservation) for P in (place.B, place.C)]
     return found, np.array(points).reshape(-1, 3)
 
@@ -224,19 +231,23 @@ def _scale(part: Sensed, length: float) -> Sensed:
     return replace(part, point=part.point / length, rows=rows / np.where(size > 0, size, 1.0))
 
 
-def _common_names(S: Array, points: Array, centre: Array, length: float, anatomy: LegDecomposition) -> tuple[str, ...]:
+def _common_names(
+    S: Array, points: Array, centre: Array, length: float, decomposition: LegDecomposition
+) -> tuple[str, ...]:
     """Names of similarities (7, k) about ``centre``, characteristic lengths: translations, turns, a scale; where these
     are not about any place of the sensed ``points`` (n, 3), about which."""
     spread = range_basis((points - centre).T / length, 1.0)[0] if len(points) else np.zeros((3, 0))
     shifts = range_basis((S @ kernel_basis(S[3:], 1.0)[0])[:3], 1.0)[0]
     anchored = np.linalg.norm(spread - shifts @ (shifts.T @ spread)) > NAMED
-    names = [f"translation along {direction_name(each, anatomy)}" for each in directions_in(shifts, anatomy)]
+    names = [
+        f"translation along {direction_name(each, decomposition)}" for each in directions_in(shifts, decomposition)
+    ]
     turning = S @ kernel_basis(S[6:], 1.0)[0]
-    for axis in directions_in(range_basis(turning[3:6], 1.0)[0], anatomy):
+    for axis in directions_in(range_basis(turning[3:6], 1.0)[0], decomposition):
         v = (turning @ np.linalg.lstsq(turning[3:6], axis, rcond=None)[0])[:3]
         v = v - shifts @ (shifts.T @ v)
         through = "" if not anchored else f" through {point_text(centre + length * np.cross(axis, v))}"
-        names.append(f"common turn about {direction_name(axis, anatomy)}{through}")
+        names.append(f"common turn about {direction_name(axis, decomposition)}{through}")
     if len(names) < S.shape[1]:
         row = S[6] / (S[6] @ S[6])
         v = S[:3] @ row
@@ -274,9 +285,9 @@ def _flexes(K: Array, trivial: Array, bodies: tuple[str, ...]) -> tuple[Flex, ..
     return tuple(found)
 
 
-def special_at(at: ClosedConfiguration, question: Measurement) -> str:
+def special_at(at: ClosedConfiguration, observation_model: ObservationModel) -> str:
     """The line or plane that holds all points that are sensed, in words; empty where they have none in common."""
-    points = seen_at(at, question)[1] / at.twin.length
+    points = seen_at(at, observation_model)[1] / at.model.length
     points = np.array([P for i, P in enumerate(points) if all(np.linalg.norm(P - Q) > NAMED for Q in points[:i])])
     if len(points) < 3:
         return ""

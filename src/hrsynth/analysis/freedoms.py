@@ -30,7 +30,7 @@ class Freedom(Value, all_recorded=True):
 
 
 def name_freedoms(
-    twists: Array, anatomy: LegDecomposition, labels: tuple[str, ...] | None = None, position: Array | None = None
+    twists: Array, decomposition: LegDecomposition, labels: tuple[str, ...] | None = None, position: Array | None = None
 ) -> tuple[Freedom, ...]:
     """Named twists that span the columns of ``twists`` (6, k), or (3, k) of a point body, in characteristic lengths of
     the mechanism, at the zero configuration.
@@ -40,17 +40,17 @@ def name_freedoms(
     """
     if twists.shape[1] == 0:
         return ()
-    twists = range_basis(_metric(twists, anatomy.mechanism.length))[0]
+    twists = range_basis(_metric(twists, decomposition.mechanism.length))[0]
     found: list[Freedom] = []
     free, _ = kernel_basis(twists[3:], 1.0)
     translations = range_basis(twists[:3] @ free, 1.0)[0] if free.shape[1] else np.zeros((3, 0))
-    for direction in directions_in(translations, anatomy):
+    for direction in directions_in(translations, decomposition):
         twist = np.concatenate([direction, np.zeros(3)])
-        found.append(Freedom(twist, f"translation along {direction_name(direction, anatomy)}"))
-    for point, direction, name in _lines(anatomy, labels) if position is None else ():
+        found.append(Freedom(twist, f"translation along {direction_name(direction, decomposition)}"))
+    for point, direction, name in _lines(decomposition, labels) if position is None else ():
         if len(found) == twists.shape[1]:
             break
-        twist = _rotation(anatomy, point, direction)
+        twist = _rotation(decomposition, point, direction)
         if _inside(twist, twists) and not _is_spanned(twist, found):
             found.append(Freedom(twist, f"rotation about {name}"))
     for column in twists.T:
@@ -59,7 +59,11 @@ def name_freedoms(
         rest = _without(column, found)
         if np.linalg.norm(rest[3:]) > NAMED and not _is_spanned(rest, found):
             twist = rest / (rest[3:] @ orient_axis(unit(rest[3:])))
-            origin = anatomy.mechanism.links[anatomy.mechanism.platform].pose[:3, 3] if position is None else position
+            origin = (
+                decomposition.mechanism.links[decomposition.mechanism.platform].pose[:3, 3]
+                if position is None
+                else position
+            )
             found.append(Freedom(twist, _screw(origin, twist)))
     return tuple(found)
 
@@ -93,10 +97,10 @@ def _is_spanned(twist: Array, found: list[Freedom]) -> bool:
     return bool(np.linalg.norm(_without(twist / np.linalg.norm(twist), found)) < NAMED)
 
 
-def directions_in(basis: Array, anatomy: LegDecomposition) -> list[Array]:
+def directions_in(basis: Array, decomposition: LegDecomposition) -> list[Array]:
     """Directions that span ``basis`` (3, k): base axes first, then P axes of the robot, then those normal to these."""
     candidates = [*np.eye(3)]
-    candidates += [j.axis for j in anatomy.mechanism.joints.values() if j.type is JointType.PRISMATIC]
+    candidates += [j.axis for j in decomposition.mechanism.joints.values() if j.type is JointType.PRISMATIC]
     chosen: list[Array] = []
     for candidate in candidates:
         inside = basis @ (basis.T @ candidate)
@@ -109,34 +113,34 @@ def directions_in(basis: Array, anatomy: LegDecomposition) -> list[Array]:
     return [*chosen, *(orient_axis(unit(each)) for each in rest.T)]
 
 
-def direction_name(direction: Array, anatomy: LegDecomposition) -> str:
+def direction_name(direction: Array, decomposition: LegDecomposition) -> str:
     for i in range(3):
         if abs(abs(direction[i]) - 1) < NAMED:
             return _AXES[i]
     along = [
         j.name
-        for j in anatomy.mechanism.joints.values()
+        for j in decomposition.mechanism.joints.values()
         if j.type is JointType.PRISMATIC and np.linalg.norm(cross(j.axis, direction)) < NAMED
     ]
     return f"{point_text(direction)}, the axis of {along[0]}" if along else point_text(direction)
 
 
-def _tips(anatomy: LegDecomposition, labels: tuple[str, ...] | None) -> list[tuple[str, Array]]:
+def _tips(decomposition: LegDecomposition, labels: tuple[str, ...] | None) -> list[tuple[str, Array]]:
     """The centre of each leg's joints on the platform, by label."""
     tips = []
-    for leg in anatomy.legs:
+    for leg in decomposition.legs:
         if labels is None or leg.label in labels:
-            joints = [j for j in anatomy.mechanism.joints_of(leg.attach) if j.name in leg.joints]
+            joints = [j for j in decomposition.mechanism.joints_of(leg.platform_link) if j.name in leg.joints]
             if joints:
                 tips.append((leg.label, np.mean([j.point for j in joints], axis=0)))
     return tips
 
 
-def _lines(anatomy: LegDecomposition, labels: tuple[str, ...] | None) -> list[tuple[Array, Array, str]]:
+def _lines(decomposition: LegDecomposition, labels: tuple[str, ...] | None) -> list[tuple[Array, Array, str]]:
     """Lines (point, direction, name) that an engineer would name."""
-    mechanism = anatomy.mechanism
+    mechanism = decomposition.mechanism
     origin = mechanism.links[mechanism.platform].pose[:3, 3]
-    tips = _tips(anatomy, labels)
+    tips = _tips(decomposition, labels)
     lines: list[tuple[Array, Array, str]] = []
     for i, (a, p) in enumerate(tips):
         for b, q in tips[i + 1 :]:
@@ -156,8 +160,8 @@ def _lines(anatomy: LegDecomposition, labels: tuple[str, ...] | None) -> list[tu
     return lines
 
 
-def _rotation(anatomy: LegDecomposition, point: Array, direction: Array) -> Array:
-    origin = anatomy.mechanism.links[anatomy.mechanism.platform].pose[:3, 3]
+def _rotation(decomposition: LegDecomposition, point: Array, direction: Array) -> Array:
+    origin = decomposition.mechanism.links[decomposition.mechanism.platform].pose[:3, 3]
     return np.concatenate([cross(direction, origin - point), direction])
 
 

@@ -1,10 +1,9 @@
 """Random rational instances of an architecture, and their exact kinematics.
 
 An instance is a random choice of axes, centres and observed directions that keeps all relations that persist in motion
-(:mod:`hrsynth.mechanism.relations`). It is drawn in linear steps: the directions one after another, then all centres at
-once, each from a solution space whose dimension is generically constant. The instances are therefore the rational
-points of an irreducible family, to which the robot's own configurations belong.
-"""
+(:mod:`hrsynth.mechanism.incidences`). It is drawn in linear steps: the directions one after another, then all centres
+at once, each from a solution space whose dimension is generically constant. The instances are therefore the rational
+points of an irreducible family, to which the robot's own configurations belong."""
 
 from __future__ import annotations
 
@@ -22,10 +21,10 @@ from ..geometry.ranks import rank_of
 from ..geometry.screws import normals
 from ..geometry.vectors import Numbers, cross, whole_multiple
 from ..mechanism import Joint, Mechanism, Observation, graphs
+from ..mechanism.cameras import ViewGeometry
+from ..mechanism.incidences import DirectionSource, Incidences
 from ..mechanism.observations.direction import SeenAxis
-from ..mechanism.relations import DirectionSource, Relations
 from ..mechanism.screws import allowed_twists
-from ..mechanism.sights import Sighting
 from ..tolerances import RANK_CUTOFF, RANK_GAP
 from .sensor_rows import SensorPlaces, rates, sighting
 
@@ -51,7 +50,7 @@ class Geometry:
 class Instance:
     """Exact maps on a basis of ker A, the velocities that all joints allow: the platform's twist, of a formation those
     of all bodies (twist rows, mobility), u × (ω − ω of the reference) for each observed direction (3, mobility), and
-    what :func:`.sensor_rows.rates` gives for other observations."""
+    what :func:`.sensor_rows.convergence_rates` gives for other observations."""
 
     geometry: Geometry
     twist: Numbers
@@ -64,7 +63,7 @@ class Instance:
     """A: what the loops ask of the joints' rates (rows, rates)."""
     rows: tuple[Numbers, ...]
     """The twist and the rates for each joint's rates, before they are taken on ker A."""
-    sightings: tuple[Sighting | None, ...]
+    sightings: tuple[ViewGeometry | None, ...]
     """Of each observation, where camera and link are; None of an encoder."""
 
     def twists(self) -> dict[str, Numbers]:
@@ -88,7 +87,7 @@ class Instance:
         return rank(np.vstack([self.twist, *rates])), rank(np.vstack(rates)) if rates else 0
 
 
-def draw(relations: Relations, rng: random.Random) -> Geometry:
+def draw(relations: Incidences, rng: random.Random) -> Geometry:
     """A random geometry; raises ``NotRecognised`` where the relations leave no direction to choose."""
     from flint import fmpq
 
@@ -103,7 +102,7 @@ def draw(relations: Relations, rng: random.Random) -> Geometry:
     )
 
 
-def ranks_at(relations: Relations, place: int) -> tuple[int, ...]:
+def ranks_at(relations: Incidences, place: int) -> tuple[int, ...]:
     """The same ranks as those of ``Geometry``, in floating point, at one of the configurations of the relations; -1
     where the singular values leave no gap."""
     directions = list(relations.directions[:, place])
@@ -121,7 +120,7 @@ def ranks_at(relations: Relations, place: int) -> tuple[int, ...]:
 
 
 def instance(
-    mechanism: Mechanism, relations: Relations, observations: Sequence[Observation], drawn: Geometry
+    mechanism: Mechanism, relations: Incidences, observations: Sequence[Observation], drawn: Geometry
 ) -> Instance:
     """The kinematics of a mechanism with this geometry, from the rates of its joints: whole numbers throughout.
 
@@ -137,7 +136,7 @@ def instance(
     if relations.point is not None:
         point, scale = whole_multiple(drawn.centres[relations.point])
         t = scale * t[:3] + cross(t[3:], point[:, None], axis=-2)
-    parts, sightings = [t], list[Sighting | None]()
+    parts, sightings = [t], list[ViewGeometry | None]()
     for observation in observations:
         sightings.append(
             sighting(observation, places, relations, drawn.centres, further, mechanism, directions.get(observation.key))
@@ -152,7 +151,7 @@ def instance(
     return Instance(drawn, t, tuple(moving), velocities, free, loops, tuple(parts), tuple(sightings))
 
 
-def _screws(joint: Joint, relations: Relations, drawn: Geometry) -> Numbers:
+def _screws(joint: Joint, relations: Incidences, drawn: Geometry) -> Numbers:
     """The twists that a joint allows, each of any length, columns of whole numbers (6, freedoms)."""
     from flint import fmpz
 
@@ -190,7 +189,7 @@ def _velocities(
     return velocities, np.vstack(loops), own
 
 
-def _directions(relations: Relations, rng: random.Random) -> tuple[tuple[Numbers, ...], list[int]]:
+def _directions(relations: Incidences, rng: random.Random) -> tuple[tuple[Numbers, ...], list[int]]:
     """A direction for each class, one after another, whole numbers; the rank of the conditions on each."""
     found: list[Numbers] = []
     ranks: list[int] = []
@@ -212,7 +211,7 @@ def _direction_rows(conditions: Sequence[tuple[int, ...]], directions: Sequence[
     return np.array(rows, dtype=object).reshape(-1, 3)
 
 
-def _centre_rows(relations: Relations, directions: Sequence[Numbers]) -> Numbers:
+def _centre_rows(relations: Incidences, directions: Sequence[Numbers]) -> Numbers:
     """The linear system of all incidences (rows, 3 centres)."""
     n = relations.count
     rows: dict[tuple[Any, ...], None] = {}

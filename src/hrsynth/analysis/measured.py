@@ -7,11 +7,11 @@ from functools import cached_property, lru_cache
 
 from ..budgets import REMEMBERED
 from ..constraints.condition import Condition, condition
+from ..constraints.excluded_poses import unexamined_poses
 from ..constraints.pattern import ConstraintPattern, moving, recognise
-from ..constraints.turning import unexamined_poses
 from ..geometry.vectors import Array
-from ..kinematics.relation import Measurement
 from ..kinematics.sampling import Samples
+from ..kinematics.velocity_relation import ObservationModel
 from ..mechanism.observation import labels_of
 from ..results import Value
 from .observed import ObservedRobot, motors
@@ -22,30 +22,30 @@ from .verdict import Verdict, verdict_of
 class MeasuredRobot(Value):
     """A robot with samples for what is measured; verdict, pattern and condition are found when they are asked for."""
 
-    setting: ObservedRobot
+    setup: ObservedRobot
     samples: Samples
 
     @classmethod
     @lru_cache(maxsize=REMEMBERED)
-    def of_directions(cls, setting: ObservedRobot) -> MeasuredRobot:
+    def of_directions(cls, setup: ObservedRobot) -> MeasuredRobot:
         """The observed directions: the hidden robot."""
-        return cls(setting, setting.samples)
+        return cls(setup, setup.samples)
 
     @classmethod
     @lru_cache(maxsize=REMEMBERED)
-    def of_motors(cls, setting: ObservedRobot) -> MeasuredRobot:
+    def of_motors(cls, setup: ObservedRobot) -> MeasuredRobot:
         """The motors' coordinates: the real robot. Raises ``BadRequest`` where it has no motor."""
-        return cls(setting, setting.measuring(motors(setting).observations))
+        return cls(setup, setup.measuring(motors(setup).observations))
 
     @classmethod
-    def of(cls, setting: ObservedRobot, real: bool) -> MeasuredRobot:
+    def of(cls, setup: ObservedRobot, real: bool) -> MeasuredRobot:
         """The ``real`` robot or the hidden one."""
-        return cls.of_motors(setting) if real else cls.of_directions(setting)
+        return cls.of_motors(setup) if real else cls.of_directions(setup)
 
     @property
-    def question(self) -> Measurement:
+    def observation_model(self) -> ObservationModel:
         """What is asked at each configuration."""
-        return self.samples.question
+        return self.samples.observation_model
 
     @property
     def rank(self) -> int:
@@ -55,31 +55,31 @@ class MeasuredRobot(Value):
     @cached_property
     def verdict(self) -> Verdict:
         """What is seen generically; raises ``RankUndecided``."""
-        return verdict_of(self.setting, labels_of(self.question.observations), self.samples)
+        return verdict_of(self.setup, labels_of(self.observation_model.observations), self.samples)
 
     @cached_property
     def pattern(self) -> ConstraintPattern:
         """The pattern of the legs with their measurements held, the same at all poses."""
-        return recognise(self.setting.anatomy, self.question, self.setting.configurations)
+        return recognise(self.setup.decomposition, self.observation_model, self.setup.configurations)
 
     @cached_property
     def generic_pattern(self) -> ConstraintPattern:
         """The same at generic poses: at special ones a held leg may leave its end more."""
         if self.pattern.motion != "other":
             return self.pattern
-        return recognise(self.setting.anatomy, self.question, self.setting.configurations, everywhere=False)
+        return recognise(self.setup.decomposition, self.observation_model, self.setup.configurations, everywhere=False)
 
     @cached_property
     def moving(self) -> tuple[str, Array | None]:
         """How the platform, one body, moves with nothing held, and the normal where that is in a plane."""
-        return moving(self.setting.anatomy, self.question, self.setting.configurations)
+        return moving(self.setup.decomposition, self.observation_model, self.setup.configurations)
 
     @cached_property
     def condition(self) -> Condition:
         """When a freedom is lost that is seen generically."""
-        return condition(self.pattern, self.question)
+        return condition(self.pattern, self.observation_model)
 
     @cached_property
     def unexamined(self) -> tuple[str, ...]:
         """Poses to which the condition does not apply, in words."""
-        return unexamined_poses(self.setting.anatomy, self.pattern, self.condition, self.setting.configurations)
+        return unexamined_poses(self.setup.decomposition, self.pattern, self.condition, self.setup.configurations)

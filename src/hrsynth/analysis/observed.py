@@ -14,14 +14,14 @@ import numpy as np
 
 from ..budgets import REMEMBERED
 from ..description import load
-from ..description.sights import CAMERA, SEE, SightSpec, parse_camera, parse_see, with_sights
+from ..description.observation_text import CAMERA, SEE, ObservationSpec, parse_camera, parse_see, with_sights
 from ..errors import BadMechanism, BadRequest, HrsynthError, NoSegment, NotSampled
 from ..geometry.ranks import range_bases
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.pinocchio_model import PinocchioModel
 from ..kinematics.platform_motion import PlatformMotion
-from ..kinematics.relation import Measurement, Relation, relation
 from ..kinematics.sampling import Sample, Samples, sample
+from ..kinematics.velocity_relation import ObservationModel, VelocityRelation, relation
 from ..mechanism import Mechanism, Observation
 from ..mechanism.legs import LegDecomposition, decompose
 from ..mechanism.noise import Noise
@@ -31,13 +31,13 @@ from ..mechanism.observations.direction import Direction
 from ..mechanism.pose import RADIANS, AskedPose, Pose, PoseForm, PoseLike
 from ..mechanism.sensors import default_observation, defaults_of, encoders, observation_of, reason
 from ..options import WATCHING, option
-from ..progress import tell
+from ..progress import report
 from ..records import As, Record, Recorded, Shown
 from ..results import Value, content
 
 if TYPE_CHECKING:
+    from ..batch.configuration_builder import ConfigurationBuilder
     from ..batch.engine import Batch
-    from ..batch.placing import Placer
 
 SAMPLES = 20
 """Configurations of a certificate and of a generic verdict."""
@@ -61,21 +61,21 @@ class Mobility(Record, all_recorded=True):
     """Freedoms of a mechanism: all of them, and those that move neither the platform nor any default segment."""
 
     total: int
-    idle: int
+    internal: int
 
 
 class MobilityWritten(NamedTuple):
     """Mobility in normal form, and that of the file's own links and joints."""
 
     total: int
-    idle: int
+    internal: int
     as_written: Annotated[Mobility | None, "null if the file's own mechanism could not be sampled"]
 
 
-class WatchedAxis(ObservationRecord):
+class ObservedAxis(ObservationRecord):
     """An observation, its axis in the frame of its link, and why it was chosen."""
 
-    why: str
+    reason: str
 
 
 class OperationModeRecord(NamedTuple):
@@ -102,9 +102,9 @@ class ObservedRobot(Value):
 
     robot: Mechanism
     normal: NormalForm
-    anatomy: LegDecomposition
+    decomposition: LegDecomposition
     observed: Recorded[tuple[Observation, ...]]
-    everything: Samples
+    all_samples: Samples
     """Samples for the question of all default segments, and besides of the observed ones and those the file names."""
     defaults: int
     """How many of the observations of ``everything`` are default segments; they come first."""
@@ -142,7 +142,7 @@ class ObservedRobot(Value):
                 )
             return robot
         robot.require_platform()
-        tell("sampling")
+        report("sampling")
         try:
             return _observed_robot(
                 robot,
@@ -170,7 +170,7 @@ class ObservedRobot(Value):
         return hash((self.robot, self.labels, *self.configurations[0].q.tolist()))
 
     def _said(self) -> tuple[Any, ...]:
-        at = [each.q for each in (self.everything.start, *self.configurations)]
+        at = [each.q for each in (self.all_samples.start, *self.configurations)]
         return self.robot, self.form, content(self.observed), content(at)
 
     def headline(self) -> str:
@@ -195,7 +195,7 @@ class ObservedRobot(Value):
     @property
     def mechanism(self) -> Mechanism:
         """The mechanism in normal form."""
-        return self.anatomy.mechanism
+        return self.decomposition.mechanism
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -205,23 +205,23 @@ class ObservedRobot(Value):
     @property
     def segments(self) -> tuple[Observation, ...]:
         """The default segments of all legs."""
-        return self.everything.question.observations[: self.defaults]
+        return self.all_samples.observation_model.observations[: self.defaults]
 
     @property
     def all_legs(self) -> tuple[Observation, ...]:
         """What all legs are watched at: their default segments, and the others of them that the file names."""
-        named = (o for o in self.mechanism.observations if o.by_segment and o.leg in self.anatomy.labels)
+        named = (o for o in self.mechanism.observations if o.by_segment and o.leg in self.decomposition.labels)
         return tuple({o.key: o for o in (*self.segments, *named)}.values())
 
     @property
     def configurations(self) -> tuple[ClosedConfiguration, ...]:
         """The configurations of the samples, without the zero configuration."""
-        return tuple(member.configuration for member in self.everything.members)
+        return tuple(member.configuration for member in self.all_samples.members)
 
     @cached_property
     def motion(self) -> PlatformMotion:
         """What the platform generically does."""
-        return replace(PlatformMotion.of(self.configurations, self.everything.question), form=self.form)
+        return replace(PlatformMotion.of(self.configurations, self.all_samples.observation_model), form=self.form)
 
     def telling(self, poses: Iterable[AskedPose]) -> ObservedRobot:
         """The same, all that is known of it kept, which tells poses in the manner of these."""
@@ -235,41 +235,45 @@ class ObservedRobot(Value):
     @cached_property
     def samples(self) -> Samples:
         """The samples, for the observed segments alone."""
-        return restrict_samples(self.everything, self.observed)
+        return restrict_samples(self.all_samples, self.observed)
 
     def beside(self) -> tuple[str, ...]:
         """The other operation modes that were met: what the platform does in each, what legs see there, and where."""
-        drawn = self.everything
-        labels = [o.leg for o in drawn.question.observations]
+        drawn = self.all_samples
+        labels = [o.leg for o in drawn.observation_model.observations]
         return tuple(
-            f"{mode.beside(drawn.signature, labels)}, at {Pose.of(mode.at.pose(drawn.question.platform))}"
-            for mode in drawn.met
+            f"{mode.beside(drawn.signature, labels)}, at {Pose.of(mode.at.pose(drawn.observation_model.platform))}"
+            for mode in drawn.other_modes
         )
 
     @property
     def dof(self) -> int:
         """The robot's dof: the dimension of its platform's twists."""
-        return self.everything.members[0].relation.dof.decided("the robot's dof")
+        return self.all_samples.members[0].relation.dof.decided("the robot's dof")
 
     @cached_property
     def batch(self) -> Batch | None:
         """The robot compiled for many poses, with the default segment of each leg; None where it cannot be."""
         from ..batch.engine import Batch
 
-        return Batch.of(self.anatomy, self.segments, self.motion, (self.everything.start, *self.configurations))
+        return Batch.of(self.decomposition, self.segments, self.motion, (self.all_samples.start, *self.configurations))
 
     @cached_property
-    def placer(self) -> Placer | None:
+    def placer(self) -> ConfigurationBuilder | None:
         """What makes closed configurations of many platform poses; None where a leg is no known subproblem."""
-        from ..batch.placing import Placer
+        from ..batch.configuration_builder import ConfigurationBuilder
 
         defaults = [o for o in self.segments if isinstance(o, Direction)]
-        return None if self.batch is None else Placer.of(self.batch, self.everything.twin, self.anatomy, defaults)
+        return (
+            None
+            if self.batch is None
+            else ConfigurationBuilder.of(self.batch, self.all_samples.model, self.decomposition, defaults)
+        )
 
     @cached_property
     def mobility(self) -> Mobility:
         """Mobility of the normal form, with its idle motions."""
-        first, every = self.everything.members[0].relation, self.everything.question.observations
+        first, every = self.all_samples.members[0].relation, self.all_samples.observation_model.observations
         places = [every.index(each) for each in self.telling_idle]
         return Mobility(first.mobility, first.mobility - select_relation(first, places).dimension)
 
@@ -277,7 +281,7 @@ class ObservedRobot(Value):
     def telling_idle(self) -> tuple[Observation, ...]:
         """What an idle motion does not change: the default segments of all legs, and whatever else is observed that is
         no segment."""
-        more = self.everything.question.observations[self.defaults :]
+        more = self.all_samples.observation_model.observations[self.defaults :]
         return *self.segments, *(each for each in more if not each.by_segment)
 
     @cached_property
@@ -285,12 +289,13 @@ class ObservedRobot(Value):
         """Mobility of the file's own links and joints."""
         if (len(self.robot.links), len(self.robot.joints)) == (len(self.mechanism.links), len(self.mechanism.joints)):
             return self.mobility
-        question = replace(
-            self.everything.question, observations=tuple(o for o in self.segments if o.link in self.robot.links)
+        observation_model = replace(
+            self.all_samples.observation_model,
+            observations=tuple(o for o in self.segments if o.link in self.robot.links),
         )
-        written = sample(PinocchioModel(self.robot, self.mechanism.length), question, 3, seed=1)
+        written = sample(PinocchioModel(self.robot, self.mechanism.length), observation_model, 3, seed=1)
         total = written.mobility
-        return Mobility(total, total - (self.mobility.total - self.mobility.idle))
+        return Mobility(total, total - (self.mobility.total - self.mobility.internal))
 
     @property
     def mobility_if_written(self) -> Mobility | None:
@@ -303,53 +308,53 @@ class ObservedRobot(Value):
     @property
     def mobilities(self) -> MobilityWritten:
         """Mobility in normal form and as written."""
-        return MobilityWritten(self.mobility.total, self.mobility.idle, self.mobility_if_written)
+        return MobilityWritten(self.mobility.total, self.mobility.internal, self.mobility_if_written)
 
     @property
-    def unlimited(self) -> tuple[str, ...]:
+    def limits_ignored(self) -> tuple[str, ...]:
         """Joints whose limits are not looked at, as the normal form joins them into others."""
-        return tuple(name for name in self.robot.limited if name not in self.mechanism.stops)
+        return tuple(name for name in self.robot.joint_ranges if name not in self.mechanism.stops)
 
     def measuring(self, observations: tuple[Observation, ...]) -> Samples:
         """The samples' configurations again, with ρ for other observations (and no ways)."""
-        drawn = self.everything
-        question = replace(drawn.question, observations=observations)
-        members = tuple(Sample(at, (), relation(at, question)) for at in self.configurations)
-        return replace(drawn, question=question, members=members)
+        drawn = self.all_samples
+        observation_model = replace(drawn.observation_model, observations=observations)
+        members = tuple(Sample(at, (), relation(at, observation_model)) for at in self.configurations)
+        return replace(drawn, observation_model=observation_model, members=members)
 
     camera_record = Shown(
         str, lambda self: self.mechanism.reference, As("camera"), "the link from which it is observed"
     )
 
-    def watched(self) -> tuple[tuple[Observation, str], ...]:
+    def observed_axes(self) -> tuple[tuple[Observation, str], ...]:
         """What is observed, and why it is that."""
-        return tuple((each, reason(self.anatomy, each)) for each in self.observed)
+        return tuple((each, reason(self.decomposition, each)) for each in self.observed)
 
     @property
-    def watched_record(self) -> list[WatchedAxis]:
+    def observed_record(self) -> list[ObservedAxis]:
         """The same as JSON has it."""
-        return [{**each.to_dict(), "why": why} for each, why in self.watched()]
+        return [{**each.to_dict(), "reason": why} for each, why in self.observed_axes()]
 
     @property
     def operation_mode(self) -> OperationModeRecord:
         """The samples' operation mode."""
-        own = self.everything.signature
+        own = self.all_samples.signature
         return OperationModeRecord(own.dof, own.motion, own.mobility)
 
     @property
     def other_modes(self) -> list[OtherMode]:
         """The other operation modes that were met."""
-        drawn = self.everything
-        labels = [o.leg for o in drawn.question.observations]
+        drawn = self.all_samples
+        labels = [o.leg for o in drawn.observation_model.observations]
         return [
             OtherMode(
                 mode.signature.dof,
                 mode.signature.motion,
                 mode.signature.mobility,
                 mode.beside(drawn.signature, labels),
-                Pose.of(mode.at.pose(drawn.question.platform)),
+                Pose.of(mode.at.pose(drawn.observation_model.platform)),
             )
-            for mode in drawn.met
+            for mode in drawn.other_modes
         ]
 
 
@@ -486,9 +491,9 @@ def _observed_robot(
     once."""
     robot, asked, possible = _seeing(robot, cameras, see, offer)
     normal = normal_form(robot)
-    anatomy = decompose(normal.mechanism)
-    defaults = defaults_of(anatomy)
-    own = tuple(o for o in anatomy.mechanism.observations if o.leg not in asked | possible)
+    decomposition = decompose(normal.mechanism)
+    defaults = defaults_of(decomposition)
+    own = tuple(o for o in decomposition.mechanism.observations if o.leg not in asked | possible)
     given = tuple(o for o in own if not o.by_segment)
     chosen = (
         ()
@@ -496,28 +501,28 @@ def _observed_robot(
         else own
         if observe is None and own
         else (
-            _encoders_of(anatomy)
+            _encoders_of(decomposition)
             if driven and not defaults
             else ()
             if blind and not defaults
-            else _observations(anatomy, normal, defaults, observe, given)
+            else _observations(decomposition, normal, defaults, observe, given)
         )
     )
-    observed = (*chosen, *(o for o in anatomy.mechanism.observations if o.leg in asked))
-    offered = tuple(o for o in anatomy.mechanism.observations if o.leg in possible)
+    observed = (*chosen, *(o for o in decomposition.mechanism.observations if o.leg in asked))
+    offered = tuple(o for o in decomposition.mechanism.observations if o.leg in possible)
     known = {o.key for o in defaults.values()}
     named = tuple(o for o in own if o.by_segment)  # of legs that are not asked for too: another set may hold them
     extra = tuple({o.key: o for o in (*observed, *offered, *named) if o.key not in known}.values())
     first, *others = normal.mechanism.bodies
-    question = Measurement(
+    observation_model = ObservationModel(
         first,
-        None if others else anatomy.point,
+        None if others else decomposition.point,
         normal.mechanism.reference,
         (*defaults.values(), *extra),
         others=tuple(others),
     )
-    drawn = sample(PinocchioModel(normal.mechanism), question, samples, seed, led_by=observed)
-    return ObservedRobot(robot, normal, anatomy, observed, drawn, len(defaults), offered=offered)
+    drawn = sample(PinocchioModel(normal.mechanism), observation_model, samples, seed, led_by=observed)
+    return ObservedRobot(robot, normal, decomposition, observed, drawn, len(defaults), offered=offered)
 
 
 def _seeing(
@@ -555,7 +560,7 @@ def _seeing(
     return robot, set().union(*labels[1 : len(see) + 1]), set().union(*labels[len(see) + 1 :])
 
 
-def _spec(option: str, text: str, eyes: Sequence[str]) -> SightSpec:
+def _spec(option: str, text: str, eyes: Sequence[str]) -> ObservationSpec:
     try:
         return parse_see(text, eyes)
     except BadRequest as error:
@@ -563,7 +568,7 @@ def _spec(option: str, text: str, eyes: Sequence[str]) -> SightSpec:
 
 
 def _observations(
-    anatomy: LegDecomposition,
+    decomposition: LegDecomposition,
     normal: NormalForm,
     defaults: dict[str, Observation],
     observe: Sequence[str] | None,
@@ -572,10 +577,10 @@ def _observations(
     if observe is not None and not observe:
         raise BadRequest("nothing is observed", "no leg", "leg labels, links, or all")
     if observe is None or list(observe) == ["all"]:
-        for leg in anatomy.legs:
+        for leg in decomposition.legs:
             if leg.label not in defaults:
                 try:
-                    default_observation(anatomy, leg)
+                    default_observation(decomposition, leg)
                 except NoSegment:
                     if not defaults:
                         raise
@@ -584,38 +589,38 @@ def _observations(
     for name in observe:
         others = [o for o in given_too if o.leg == name]
         chosen |= {o.key: o for o in others}
-        if others and name not in anatomy.labels:
+        if others and name not in decomposition.labels:
             continue
-        if name in anatomy.labels:
-            observation = defaults.get(name) or default_observation(anatomy, anatomy.leg(name))
-            chosen |= {o.key: o for o in anatomy.mechanism.observations if o.by_segment and o.leg == name}
+        if name in decomposition.labels:
+            observation = defaults.get(name) or default_observation(decomposition, decomposition.leg(name))
+            chosen |= {o.key: o for o in decomposition.mechanism.observations if o.by_segment and o.leg == name}
         elif name in normal.into:
             link = normal.into[name]
-            if link not in anatomy.mechanism.links:
+            if link not in decomposition.mechanism.links:
                 raise BadRequest(f"link {name!r} acts inside a joint and has no direction of its own")
-            given = next((o for o in anatomy.mechanism.observations if o.link == link and o.by_segment), None)
-            observation = given or observation_of(anatomy, link)
+            given = next((o for o in decomposition.mechanism.observations if o.link == link and o.by_segment), None)
+            observation = given or observation_of(decomposition, link)
         else:
             raise BadRequest(
-                f"{anatomy.mechanism.name} has no leg or link",
+                f"{decomposition.mechanism.name} has no leg or link",
                 name,
                 "legs "
-                + ", ".join([*anatomy.labels, *labels_of(given_too)])
+                + ", ".join([*decomposition.labels, *labels_of(given_too)])
                 + "; links "
-                + ", ".join(n for leg in anatomy.legs for n in leg.links),
+                + ", ".join(n for leg in decomposition.legs for n in leg.links),
             )
         chosen[observation.key] = observation
     return tuple(chosen.values())
 
 
-def motors(setting: ObservedRobot) -> Measurement:
+def motors(setup: ObservedRobot) -> ObservationModel:
     """The question that a robot's own motors answer: their coordinates, as encoders would give them."""
-    return replace(setting.everything.question, observations=_encoders_of(setting.anatomy))
+    return replace(setup.all_samples.observation_model, observations=_encoders_of(setup.decomposition))
 
 
-def _encoders_of(anatomy: LegDecomposition) -> tuple[Observation, ...]:
-    mechanism = anatomy.mechanism
-    of = {name: leg.label for leg in anatomy.legs for name in leg.joints}
+def _encoders_of(decomposition: LegDecomposition) -> tuple[Observation, ...]:
+    mechanism = decomposition.mechanism
+    of = {name: leg.label for leg in decomposition.legs for name in leg.joints}
     mechanism.require_motors()
     driven = [joint for joint in mechanism.joints.values() if joint.actuated]
     return tuple(each for joint in driven for each in encoders(mechanism, joint, of.get(joint.name, "")))
@@ -624,10 +629,10 @@ def _encoders_of(anatomy: LegDecomposition) -> tuple[Observation, ...]:
 def restrict_samples(samples: Samples, observations: Iterable[Observation], *, ways: bool = True) -> Samples:
     """The same samples for fewer observations (all of them among the samples' own), with their ``ways`` or without."""
     wanted = tuple(observations)
-    all_of = samples.question.observations
+    all_of = samples.observation_model.observations
     keys = [o.key for o in all_of]
     places = [keys.index(o.key) for o in wanted]
-    question = replace(samples.question, observations=tuple(all_of[i] for i in places))
+    observation_model = replace(samples.observation_model, observations=tuple(all_of[i] for i in places))
     found = _select_relations([member.relation for member in samples.members], places)
     members = tuple(
         Sample(
@@ -637,17 +642,19 @@ def restrict_samples(samples: Samples, observations: Iterable[Observation], *, w
         )
         for m, each in zip(samples.members, found, strict=True)
     )
-    return replace(samples, question=question, members=members)
+    return replace(samples, observation_model=observation_model, members=members)
 
 
-def select_relation(relation: Relation, places: Sequence[int]) -> Relation:
+def select_relation(relation: VelocityRelation, places: Sequence[int]) -> VelocityRelation:
     """ρ for some of the observations: the projection of ρ for all."""
     return _select_relations([relation], places)[0]
 
 
-def _select_relations(relations: Sequence[Relation], places: Sequence[int]) -> list[Relation]:
+def _select_relations(relations: Sequence[VelocityRelation], places: Sequence[int]) -> list[VelocityRelation]:
     rows = [np.vstack([each.twist_part, *(each.basis[each.rows_of(place)] for place in places)]) for each in relations]
     return [
-        Relation(basis, each.twist_rows, tuple(each.sizes[i] for i in places), each.mobility, min(each.gap, rank.gap))
+        VelocityRelation(
+            basis, each.twist_rows, tuple(each.sizes[i] for i in places), each.mobility, min(each.gap, rank.gap)
+        )
         for each, (basis, rank) in zip(relations, range_bases(rows, 1.0), strict=True)
     ]

@@ -14,10 +14,10 @@ import numpy as np
 
 from ..geometry.vectors import Numbers, whole_multiple
 from ..mechanism import Direction, Mechanism, Observation
+from ..mechanism.cameras import CameraObservation, ViewGeometry
+from ..mechanism.incidences import Incidences
 from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.observations.encoder import AngleEncoder, Encoder
-from ..mechanism.relations import Relations
-from ..mechanism.sights import CameraObservation, Sighting
 
 DEGREE = 4
 """No wrench of a kind has a larger degree in points and directions together, each counted as the largest of them."""
@@ -58,12 +58,12 @@ def has_exact_rates(seen: Observation) -> bool:
 def sighting(
     seen: Observation,
     places: SensorPlaces,
-    relations: Relations,
+    relations: Incidences,
     centres: Numbers,
     sights: Sequence[Numbers],
     mechanism: Mechanism,
     direction: Numbers | None,
-) -> Sighting | None:
+) -> ViewGeometry | None:
     """Where camera and link of an observation are at a rational instance; ``centres`` are rational, the ``sights`` the
     directions of ``places``, ``direction`` is that of an observed axis. None of an encoder."""
     from flint import fmpq
@@ -71,19 +71,19 @@ def sighting(
     nothing = np.array([fmpq(0)] * 3, dtype=object)
     if isinstance(seen, SeenAxis):
         assert direction is not None
-        return Sighting(nothing, nothing, nothing, np.array([fmpq(x) for x in direction], dtype=object))
+        return ViewGeometry(nothing, nothing, nothing, np.array([fmpq(x) for x in direction], dtype=object))
     if not isinstance(seen, CameraObservation):
         return None
     B, C = (
         centres[relations.count - len(places.points) + places.points.index(point)] for point in _points(seen, mechanism)
     )
     axes = [sights[places.directions.index(axis)] for axis in _directions(seen, mechanism)]
-    return Sighting(C, axes[-1] if axes else nothing, B, axes[0] if seen.axis is not None else nothing)
+    return ViewGeometry(C, axes[-1] if axes else nothing, B, axes[0] if seen.axis is not None else nothing)
 
 
 def rates(
     seen: Observation,
-    at: Sighting | None,
+    at: ViewGeometry | None,
     mechanism: Mechanism,
     velocities: Mapping[str, Numbers],
     columns: Mapping[str, slice],

@@ -8,8 +8,8 @@ from typing import Annotated, NamedTuple
 
 from ..errors import RankUndecided
 from ..geometry.ranks import Rank
-from ..kinematics.relation import Relation, look, relation
 from ..kinematics.sampling import Samples
+from ..kinematics.velocity_relation import VelocityRelation, look, relation
 from ..records import GAP, OPTIONAL, Recorded, Shown, Word, recorded
 from ..results import Result
 from ..tolerances import RANK_CUTOFF, RANK_GAP, SURELY_SOMETHING, SURELY_ZERO
@@ -34,8 +34,8 @@ def word(rank: int, dof: int) -> str:
 class Margin(NamedTuple):
     """The smallest singular value that counts, the largest that does not, and where the cut is."""
 
-    counted: float
-    dropped: float
+    smallest_kept: float
+    largest_dropped: float
     cutoff: float
 
 
@@ -47,14 +47,14 @@ class Verdict(Result, shown_as="verdict"):
     verdict: Annotated[str, Word]
     dof: int
     rank: Recorded[int]
-    lost: Recorded[tuple[Freedom, ...]]
+    unobserved: Recorded[tuple[Freedom, ...]]
     gap: Annotated[float, GAP]
     has_interaction_matrix: Recorded[bool] = True
     """Whether Mᵀ exists: no observed direction moves while the platform rests."""
-    counted: float = 1.0
+    smallest_kept: float = 1.0
     """The smallest singular value of the measured rates on ρ that counts as seen, at the sample where it is largest:
     single samples may lie near a singularity, whatever the dimensions."""
-    dropped: float = 0.0
+    largest_dropped: float = 0.0
     """The largest that does not, at the sample where it is least."""
     formation: Annotated[Formation | None, Formation, OPTIONAL] = None
     """Of a formation: what is not seen, trivial motions and flexes; ``dof`` are the freedoms of all bodies."""
@@ -67,18 +67,18 @@ class Verdict(Result, shown_as="verdict"):
     @property
     def near(self) -> bool:
         """Whether a singular value lies so near to the cutoff that slightly other geometry has another verdict."""
-        return (self.rank > 0 and self.counted < SURELY_SOMETHING) or self.dropped > SURELY_ZERO
+        return (self.rank > 0 and self.smallest_kept < SURELY_SOMETHING) or self.largest_dropped > SURELY_ZERO
 
     @property
     def named(self) -> str:
         """The lost freedoms, and where they have these names: at other configurations others are lost."""
-        names = "; ".join(each.name for each in self.lost)
+        names = "; ".join(each.name for each in self.unobserved)
         return names if ELSEWHERE in names else f"{names} (at the zero configuration)"
 
     @property
     def never(self) -> str:
         """How many freedoms are lost at all configurations, and which at one of them."""
-        count = len(self.lost)
+        count = len(self.unobserved)
         return f"{count} of {self.dof} freedoms {'is' if count == 1 else 'are'} never seen: {self.named}"
 
     def headline(self) -> str:
@@ -91,10 +91,10 @@ class Verdict(Result, shown_as="verdict"):
     @recorded()
     def margin(self) -> Margin:
         """The smallest singular value that counts, the largest that does not, and where the cut is."""
-        return Margin(self.counted, self.dropped, RANK_CUTOFF)
+        return Margin(self.smallest_kept, self.largest_dropped, RANK_CUTOFF)
 
 
-def verdict_of(setting: ObservedRobot, legs: Sequence[str], samples: Samples) -> Verdict:
+def verdict_of(setup: ObservedRobot, legs: Sequence[str], samples: Samples) -> Verdict:
     """The verdict for ``samples``, whose observations are those of ``legs``.
 
     All samples are of one operation mode and must show one rank. Raises ``RankUndecided`` where its gap is too small at
@@ -109,15 +109,15 @@ def verdict_of(setting: ObservedRobot, legs: Sequence[str], samples: Samples) ->
         raise RankUndecided(f"{what} is not the same at all configurations", between, RANK_GAP)
     gap = min(min(each.gap, each.RO.gap) for each in found)
     Rank(rank, gap).decided(what)
-    dof = setting.dof
+    dof = setup.dof
     lost, formation, at_zero = tuple[Freedom, ...](), None, None
-    start = relation(samples.start, samples.question)
-    if setting.mechanism.formation:
-        formation = _formation(setting, samples, start, dof - rank)
+    start = relation(samples.start, samples.observation_model)
+    if setup.mechanism.formation:
+        formation = _formation(setup, samples, start, dof - rank)
     else:
         shown = max(dof - start.unobserved_twists.shape[1], 0)
         at_zero = shown if shown < rank and start.gap >= RANK_GAP else None
-        lost = _lost_freedoms(setting, samples, start, tuple(legs), dof - rank) if rank < dof else ()
+        lost = _lost_freedoms(setup, samples, start, tuple(legs), dof - rank) if rank < dof else ()
     graph = not any(each.RI for each in found)
     said = word(rank, dof) if formation is None else formation.verdict
     return Verdict(
@@ -135,27 +135,30 @@ def verdict_of(setting: ObservedRobot, legs: Sequence[str], samples: Samples) ->
     )
 
 
-def _formation(setting: ObservedRobot, samples: Samples, start: Relation, count: int) -> Formation:
+def _formation(setup: ObservedRobot, samples: Samples, start: VelocityRelation, count: int) -> Formation:
     """What is not seen of a formation, at the zero configuration (ρ there: ``start``) where it is as at a sample, else
     there."""
     member = samples.members[0]
-    usual = formation_at(member.configuration, samples.question, member.relation, setting.anatomy)
+    usual = formation_at(member.configuration, samples.observation_model, member.relation, setup.decomposition)
     if start.unobserved_twists.shape[1] != count or start.gap < RANK_GAP:
         return usual
-    found = formation_at(samples.start, samples.question, start, setting.anatomy)
+    found = formation_at(samples.start, samples.observation_model, start, setup.decomposition)
     return found if len(found.trivial) == len(usual.trivial) else usual
 
 
 def _lost_freedoms(
-    setting: ObservedRobot, samples: Samples, start: Relation, legs: tuple[str, ...], count: int
+    setup: ObservedRobot, samples: Samples, start: VelocityRelation, legs: tuple[str, ...], count: int
 ) -> tuple[Freedom, ...]:
     """The lost freedoms at the zero configuration (ρ there: ``start``) where it is generic, else at a sample."""
     position = None
     found = start.unobserved_twists
     if found.shape[1] != count or start.gap < RANK_GAP:
         member = next(member for member in samples.members if member.relation.unobserved_twists.shape[1] == count)
-        found, position = member.relation.unobserved_twists, member.configuration.pose(samples.question.platform)[:3, 3]
-    named = name_freedoms(found, setting.anatomy, legs, position)
+        found, position = (
+            member.relation.unobserved_twists,
+            member.configuration.pose(samples.observation_model.platform)[:3, 3],
+        )
+    named = name_freedoms(found, setup.decomposition, legs, position)
     if position is None:
         return named
     return tuple(replace(each, name=f"{each.name} ({ELSEWHERE} {point_text(position)} m)") for each in named)

@@ -28,8 +28,8 @@ from ..results import Value
 from ..tolerances import RANK_CUTOFF
 from .direction_rows import direction_rows
 from .error_bounds import ErrorBound, bounds_compiled, bounds_of
-from .holds import Hold, freedoms, holds_of_leg
 from .iterative_leg import IterativeLeg, IterativeLegStates
+from .leg_wrenches import LegForce, freedoms, holds_of_leg
 from .platform_coordinates import PlatformCoordinates, SlidingLink, frames_at, sliding_links
 from .program import CHUNK, Compiled, Program
 from .recognition import recognise_leg
@@ -90,7 +90,7 @@ class Batch(Value):
     """The platform's pose at the zero configuration, (4, 4)."""
     legs: Mapping[str, ClosedFormLeg | IterativeLeg | None]
     iterative: Mapping[str, IterativeLeg]
-    holds: Sequence[Hold]
+    holds: Sequence[LegForce]
     """Where the platform has other twists at each pose and legs in closed form say which: what they forbid."""
     normals: Mapping[str, Array | None]
     length: float
@@ -102,7 +102,7 @@ class Batch(Value):
     @classmethod
     def of(
         cls,
-        anatomy: LegDecomposition,
+        decomposition: LegDecomposition,
         observations: Sequence[Observation],
         motion: PlatformMotion,
         configurations: Sequence[ClosedConfiguration],
@@ -112,40 +112,40 @@ class Batch(Value):
 
         ``configurations`` are closed ones, the zero configuration first: what is recognised must hold at all of them.
         """
-        mechanism = anatomy.mechanism
+        mechanism = decomposition.mechanism
         seen = {o.leg: o for o in observations if isinstance(o, Direction) and o.seen_from is None}
         if (
             mechanism.couplings
-            or mechanism.wrists
+            or mechanism.tilt_limits
             or mechanism.reference != mechanism.base
             or len(seen) < len(observations)
-            or set(seen) != set(anatomy.labels)
+            or set(seen) != set(decomposition.labels)
         ):
             return None
         frames = frames_at(configurations)
-        names = tuple(dict.fromkeys((*anatomy.platform, mechanism.platform)))
+        names = tuple(dict.fromkeys((*decomposition.platform, mechanism.platform)))
         coordinates = PlatformCoordinates.of(motion, frames, names, mechanism.length)
         legs: dict[str, ClosedFormLeg | IterativeLeg | None] = {}
         iterative: dict[str, IterativeLeg] = {}
-        for leg in anatomy.legs:
-            found = recognise_leg(anatomy, leg, seen[leg.label], coordinates, frames)
-            placed = anatomy.point is not None or leg.attach in coordinates.links
+        for leg in decomposition.legs:
+            found = recognise_leg(decomposition, leg, seen[leg.label], coordinates, frames)
+            placed = decomposition.point is not None or leg.platform_link in coordinates.links
             if placed and (found is None or not coordinates.constant):
-                iterative[leg.label] = IterativeLeg.of(mechanism, leg, seen[leg.label], anatomy.point)
+                iterative[leg.label] = IterativeLeg.of(mechanism, leg, seen[leg.label], decomposition.point)
             legs[leg.label] = found or iterative.get(leg.label)
-        holds = _holds(anatomy, coordinates, iterative, frames)
+        holds = _holds(decomposition, coordinates, iterative, frames)
         if holds:
             iterative = {label: leg for label, leg in iterative.items() if legs[label] is leg}
         normals = {o.leg: _axis_of(frames[o.link][:, :3, :3] @ o.direction) for o in seen.values()}
         sliding: dict[str, tuple[SlidingLink, ClosedFormLeg]] = {}
         if coordinates.constant and not iterative:
             slid = sliding_links(coordinates, frames, names, mechanism)
-            for leg in anatomy.legs:
-                if legs[leg.label] is None and leg.attach in slid:
-                    link, far = slid[leg.attach]
+            for leg in decomposition.legs:
+                if legs[leg.label] is None and leg.platform_link in slid:
+                    link, far = slid[leg.platform_link]
                     there = {**frames, mechanism.platform: link.moved(frames[mechanism.platform], far)}
-                    placed_so = replace(coordinates, links={leg.attach: link.body})
-                    form = recognise_leg(anatomy, leg, seen[leg.label], placed_so, there)
+                    placed_so = replace(coordinates, links={leg.platform_link: link.body})
+                    form = recognise_leg(decomposition, leg, seen[leg.label], placed_so, there)
                     if form is not None:
                         sliding[leg.label] = link, form
         return cls(coordinates, frozen(motion.home), legs, iterative, holds, normals, mechanism.length, sliding)
@@ -431,23 +431,23 @@ def _span(coordinates: PlatformCoordinates, length: float) -> Array:
 
 
 def _holds(
-    anatomy: LegDecomposition,
+    decomposition: LegDecomposition,
     coordinates: PlatformCoordinates,
     legs: Mapping[str, IterativeLeg],
     frames: Mapping[str, Array],
-) -> tuple[Hold, ...]:
+) -> tuple[LegForce, ...]:
     """What the legs forbid the platform, where that is known in closed form and decides its twists; else nothing."""
-    if coordinates.constant or anatomy.point is not None or set(legs) != set(anatomy.labels):
+    if coordinates.constant or decomposition.point is not None or set(legs) != set(decomposition.labels):
         return ()
-    span = _span(coordinates, anatomy.mechanism.length)
-    p, R = coordinates.place(frames[anatomy.mechanism.platform])
-    found: list[Hold] = []
-    for leg in anatomy.legs:
+    span = _span(coordinates, decomposition.mechanism.length)
+    p, R = coordinates.place(frames[decomposition.mechanism.platform])
+    found: list[LegForce] = []
+    for leg in decomposition.legs:
         chain = legs[leg.label]
         state = np.stack([frames[link] for link in chain.links], axis=1)
         state[:, :, :3, 3] /= chain.length
         states = IterativeLegStates(chain, coordinates, state, np.zeros(len(state)), R, span)
-        holds = holds_of_leg(anatomy.mechanism, leg, coordinates, states, p)
+        holds = holds_of_leg(decomposition.mechanism, leg, coordinates, states, p)
         if holds is None:
             return ()
         found += holds

@@ -9,18 +9,18 @@ import numpy as np
 from ..geometry.so3 import exponential
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.platform_motion import Goal, PlatformMotion
+from ..kinematics.platform_motion import PlatformMotion, PoseTask
 from ..mechanism.pose import Grid
 from ..tolerances import FOLLOWED, RANK_CUTOFF
+from .configuration_builder import ConfigurationBuilder
 from .engine import Flags
-from .placing import Placer
 
 TURNS = 180
 """Values of a free turn that are tried before a pose counts as out of reach."""
 
 
 def ready(
-    placer: Placer, motion: PlatformMotion, goals: Sequence[Goal]
+    placer: ConfigurationBuilder, motion: PlatformMotion, goals: Sequence[PoseTask]
 ) -> tuple[dict[int, ClosedConfiguration], set[int]]:
     """The configurations at goals whose free parts are as at home, by their place; and the places of goals that no pose
     of the platform reaches in the working mode of the zero configuration."""
@@ -28,7 +28,7 @@ def ready(
     found = {
         i: at
         for i, at in enumerate(placer.configurations(X))
-        if at is not None and np.linalg.norm(goals[i].rows(placer.twin, at.q)[0]) <= RANK_CUTOFF
+        if at is not None and np.linalg.norm(goals[i].error_and_jacobian(placer.model, at.q)[0]) <= RANK_CUTOFF
     }
     missed = [i for i in range(len(goals)) if i not in found]
     closed, turning = (
@@ -58,7 +58,7 @@ def poses_over(motion: PlatformMotion, grid: Grid, robot: str, places: Array) ->
     return X, met
 
 
-def _some_turn(placer: Placer, motion: PlatformMotion, X: Array) -> Flags:
+def _some_turn(placer: ConfigurationBuilder, motion: PlatformMotion, X: Array) -> Flags:
     """Whether some turn about the platform's one axis makes each of the poses X (n, 4, 4) one that is reached, (n,)."""
     if len(X) == 0:
         return np.zeros(0, dtype=bool)

@@ -43,7 +43,7 @@ that stay perpendicular."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Ties(Value):
+class ClosureRows(Value):
     """The rows of joints: forces (i, j, n in i, point in i, point in j), moments (i, j, α in i, β in j, level); and
     directions that coincide (i, j, α in i, β in j), which moments alone do not tell from opposite ones."""
 
@@ -134,7 +134,7 @@ class IterativeLeg(Value):
     links: tuple[str, ...]
     free: NDArray[np.int64]
     zero: Array
-    ties: Ties
+    ties: ClosureRows
     seen: tuple[int, Array]
     """The number of the observed link, and the direction in its frame."""
     length: float
@@ -142,10 +142,12 @@ class IterativeLeg(Value):
     @classmethod
     def of(cls, mechanism: Mechanism, leg: Leg, seen: Direction, point: Array | None) -> IterativeLeg:
         """The chain of a leg; ``point`` where the platform is a point body."""
-        own = [link for link in dict.fromkeys((*leg.links, seen.link)) if link not in (mechanism.base, leg.attach)]
-        links = (mechanism.base, leg.attach, *own)
+        own = [
+            link for link in dict.fromkeys((*leg.links, seen.link)) if link not in (mechanism.base, leg.platform_link)
+        ]
+        links = (mechanism.base, leg.platform_link, *own)
         place = {name: number for number, name in enumerate(links)}
-        ties = Ties()
+        ties = ClosureRows()
         for name in leg.joints:
             joint = mechanism.joints[name]
             i, j = (place[link] for link in joint.links)

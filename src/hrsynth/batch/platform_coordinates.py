@@ -155,6 +155,6 @@ def _body(p: Array, R: Array, X: Array, length: float) -> PlatformLink | None:
 
 def frames_at(configurations: Sequence[ClosedConfiguration]) -> dict[str, Array]:
     """Poses (m, 4, 4) of all links at closed configurations."""
-    names = tuple(configurations[0].twin.mechanism.links)
-    X = np.array([at.twin.poses(at.q, names) for at in configurations])
+    names = tuple(configurations[0].model.mechanism.links)
+    X = np.array([at.model.poses(at.q, names) for at in configurations])
     return {name: X[:, i] for i, name in enumerate(names)}

@@ -29,13 +29,13 @@ DRIVING = (JointType.REVOLUTE, JointType.PRISMATIC)
 
 
 def recognise_leg(
-    anatomy: LegDecomposition, leg: Leg, seen: Direction, coordinates: PlatformCoordinates, frames: Frames
+    decomposition: LegDecomposition, leg: Leg, seen: Direction, coordinates: PlatformCoordinates, frames: Frames
 ) -> ClosedFormLeg | None:
     """The closed form of the leg, or None; ``seen`` is the direction observed in it."""
-    X = frames[anatomy.mechanism.platform]
+    X = frames[decomposition.mechanism.platform]
     p, R = coordinates.place(X)
     u = frames[seen.link][:, :3, :3] @ seen.direction
-    for form in _candidates(anatomy, leg, coordinates, frames, p, R, u):
+    for form in _candidates(decomposition, leg, coordinates, frames, p, R, u):
         if form is not None and _holds(form, p, R, u):
             if coordinates.rotations.shape[1] or isinstance(form, PlatformDirection):
                 return form
@@ -60,9 +60,15 @@ def _holds(form: ClosedFormLeg, p: Array, R: Array, u: Array) -> bool:
 
 
 def _candidates(
-    anatomy: LegDecomposition, leg: Leg, coordinates: PlatformCoordinates, frames: Frames, p: Array, R: Array, u: Array
+    decomposition: LegDecomposition,
+    leg: Leg,
+    coordinates: PlatformCoordinates,
+    frames: Frames,
+    p: Array,
+    R: Array,
+    u: Array,
 ) -> Iterator[ClosedFormLeg | None]:
-    mechanism = anatomy.mechanism
+    mechanism = decomposition.mechanism
     joints = [mechanism.joints[name] for name in leg.joints]
     feet = [joint for joint in joints if mechanism.base in joint.links]
     if sum(joint.type.slides for joint in joints) >= 2:
@@ -72,8 +78,8 @@ def _candidates(
         yield PlatformDirection(leg.label, axis=R[0].T @ u[0])
     for one in feet:
         for joint in joints:
-            yield _crossing(anatomy, leg, coordinates, one, joint, frames, R, u)
-    for tip, ends in _tips(anatomy, leg, coordinates):
+            yield _crossing(decomposition, leg, coordinates, one, joint, frames, R, u)
+    for tip, ends in _tips(decomposition, leg, coordinates):
         for one in feet:
             for start in dict.fromkeys(map(tuple, (one.point, ends(one)[0]))):
                 yield _spring(leg.label, tip(ends(one)[1]), np.array(start), p, R, u)
@@ -93,22 +99,24 @@ Place = Callable[[Array], PlatformPoint]
 Centres = Callable[[Joint], tuple[Array, Array]]
 
 
-def _tips(anatomy: LegDecomposition, leg: Leg, coordinates: PlatformCoordinates) -> Iterator[tuple[Place, Centres]]:
+def _tips(
+    decomposition: LegDecomposition, leg: Leg, coordinates: PlatformCoordinates
+) -> Iterator[tuple[Place, Centres]]:
     """For each joint on the platform: what makes a point of the platform, and what gives the centres of another joint
     and of this one, as a segment sees them."""
-    mechanism = anatomy.mechanism
-    if anatomy.point is not None:
+    mechanism = decomposition.mechanism
+    if decomposition.point is not None:
         frame = mechanism.links[mechanism.platform].pose
-        place = frame[:3, :3] @ anatomy.point + frame[:3, 3]
+        place = frame[:3, :3] @ decomposition.point + frame[:3, 3]
         end = mechanism.joints_of(mechanism.platform)[0]
         yield (lambda point: PlatformPoint(True, np.zeros(3), point - place)), (lambda other: centre_pair(other, end))
         return
-    body = coordinates.links.get(leg.attach)
+    body = coordinates.links.get(leg.platform_link)
     if body is None:
         return
-    to_body = inverse(mechanism.links[leg.attach].pose)
+    to_body = inverse(mechanism.links[leg.platform_link].pose)
     for name in leg.joints:
-        if leg.attach in mechanism.joints[name].links:
+        if leg.platform_link in mechanism.joints[name].links:
             yield (
                 (lambda point: body.point(to_body[:3, :3] @ point + to_body[:3, 3])),
                 partial(_centres, mechanism.joints[name]),
@@ -125,7 +133,7 @@ def displacement(frames: Frames, mechanism: Mechanism, link: str) -> Array:
 
 
 def _crossing(
-    anatomy: LegDecomposition,
+    decomposition: LegDecomposition,
     leg: Leg,
     coordinates: PlatformCoordinates,
     first: Joint,
@@ -135,7 +143,7 @@ def _crossing(
     u: Array,
 ) -> PlatformDirection | None:
     """A crank whose end slides along a line of the platform: an R at the base, an R, a P."""
-    mechanism, body = anatomy.mechanism, coordinates.links.get(leg.attach)
+    mechanism, body = decomposition.mechanism, coordinates.links.get(leg.platform_link)
     kinds = "".join(mechanism.joints[name].type.value for name in leg.joints)
     crank = first.other(mechanism.base)
     if (
@@ -152,8 +160,11 @@ def _crossing(
         X = displacement(frames, mechanism, link)
         return np.asarray(X[:3, :3] @ second.point + X[:3, 3])
 
-    B, tip = moved(crank), body.point(inverse(mechanism.links[leg.attach].pose)[:3] @ np.append(second.point, 1.0))
-    C = moved(leg.attach)
+    B, tip = (
+        moved(crank),
+        body.point(inverse(mechanism.links[leg.platform_link].pose)[:3] @ np.append(second.point, 1.0)),
+    )
+    C = moved(leg.platform_link)
     centre = foot(second.point, first.point, first.axis)
     if np.linalg.norm(np.cross(B - C, u[0])) > SAME_GEOMETRY * mechanism.length:
         return None

@@ -73,7 +73,7 @@ def architectures() -> WordSource:
 
 def without_motors(word: str) -> str:
     """The word without its motors: what a hidden robot is found from."""
-    from .words import parse
+    from .architecture_key import parse
 
     return str(parse(word).unmoved)
 

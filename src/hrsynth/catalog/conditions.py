@@ -12,9 +12,9 @@ from typing import Any
 
 from ..budgets import LARGEST_RECORD
 from ..errors import BadRequest
+from .architecture_key import LONGEST_COUNT, MOVED, count_equal, sights
 from .jsonl import FLAGS, LINE_START, Record, is_written, leading_word, record
 from .known import kinds, kinds_called, known_as
-from .words import LONGEST_COUNT, MOVED, count_equal, sights
 
 FIELDS = (
     "word",

@@ -8,8 +8,8 @@ from ..errors import HrsynthError
 from ..mechanism.legs import decompose
 from ..mechanism.normal import normal_form
 from ..mechanism.sensors import default_observation
+from .architecture_key import COMPOSITE, ArchitectureKey, LegKey, count_equal
 from .geometry import mechanism
-from .words import COMPOSITE, LegWord, RobotWord, count_equal
 
 ENDS = {
     "": ("platform",),
@@ -24,10 +24,10 @@ BETWEEN = {
 }
 
 
-def drawing(word: RobotWord) -> str:
+def drawing(word: ArchitectureKey) -> str:
     """A line for all legs that are equal: ``*`` marks a motor, a double line the watched link."""
     watched = _observed_places(word)
-    groups: dict[tuple[int, LegWord], list[int]] = {}
+    groups: dict[tuple[int, LegKey], list[int]] = {}
     number = 0
     for body, legs in enumerate(word.bodies):
         for leg in legs:
@@ -47,7 +47,7 @@ def _head(numbers: list[int]) -> str:
     return f"leg{'s' * (len(numbers) > 1)} {', '.join(map(str, numbers))}"
 
 
-def _chain(leg: LegWord, watched: int | None, end: str) -> str:
+def _chain(leg: LegKey, watched: int | None, end: str) -> str:
     """The chain; ``watched`` is the joint inside or after which the observed link lies."""
     text, last = "base", len(leg.joints) - 1
     for i, joint in enumerate(leg.joints):
@@ -55,7 +55,7 @@ def _chain(leg: LegWord, watched: int | None, end: str) -> str:
     return f"{text} {_line(leg, last + 1, watched)} {end}"
 
 
-def _line(leg: LegWord, place: int, watched: int | None) -> str:
+def _line(leg: LegKey, place: int, watched: int | None) -> str:
     """The link before a joint: double if it is the watched one, and on both sides of a composite whose rod is."""
     if watched is None:
         return "──"
@@ -63,15 +63,15 @@ def _line(leg: LegWord, place: int, watched: int | None) -> str:
     return "══" if place == watched + 1 or (inside and place == watched) else "──"
 
 
-def _observed_places(word: RobotWord) -> dict[int, int]:
+def _observed_places(word: ArchitectureKey) -> dict[int, int]:
     """The place of the observed link in each leg: the joint inside or after which it lies; nothing where the mechanism
     cannot be made, or something else is seen."""
     if word.seen:
         return {}
     try:
-        anatomy = decompose(normal_form(mechanism(word)).mechanism)
-        given = {seen.leg: seen.link for seen in anatomy.mechanism.observations if seen.by_segment}
-        links = [given.get(leg.label) or default_observation(anatomy, leg).link for leg in anatomy.legs]
+        decomposition = decompose(normal_form(mechanism(word)).mechanism)
+        given = {seen.leg: seen.link for seen in decomposition.mechanism.observations if seen.by_segment}
+        links = [given.get(leg.label) or default_observation(decomposition, leg).link for leg in decomposition.legs]
     except HrsynthError:
         return {}
     found = (re.fullmatch(r"(?:link|rod)_(\d+)_(\d+)a?", link) for link in links)

@@ -11,21 +11,21 @@ from itertools import combinations, groupby
 from typing import Any
 
 from ..analysis.advice import Advice, advise
-from ..analysis.asked import observe
 from ..analysis.derive import derive
 from ..analysis.exact import ExactArchitecture, architecture
 from ..analysis.measured import MeasuredRobot
+from ..analysis.modes.methods import count_modes as counted_modes
+from ..analysis.modes.methods import expected_modes
 from ..analysis.modes.modes import modes
 from ..analysis.modes.solve import SystemModes
-from ..analysis.modes.ways import count_modes as counted_modes
-from ..analysis.modes.ways import expected_modes
 from ..analysis.observed import ObservedRobot, restrict_samples, select_relation
+from ..analysis.pose_requests import observe
 from ..analysis.verdict import CONTROLLABLE, Verdict, verdict_of
-from ..errors import BadRequest, HrsynthError, MissingExtra, NotConfined, NotConfirmed, Unsolved
+from ..errors import BadRequest, HrsynthError, MissingExtra, NotConfirmed, SystemNotSolved, UnsupportedLocus
 from ..geometry.ranks import range_basis
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.relation import Relation, relation
 from ..kinematics.sampling import Samples
+from ..kinematics.velocity_relation import VelocityRelation, relation
 from ..mechanism import Observation
 from ..mechanism.legs import decompose
 from ..mechanism.model import Mechanism
@@ -33,9 +33,9 @@ from ..mechanism.normal import normal_form
 from ..mechanism.sensors import encoders
 from ..rewrite.strategy import Step
 from ..tolerances import PROVED_CHANCE
+from .architecture_key import ArchitectureKey, count_equal, parse
 from .geometry import mechanism
 from .groups import group
-from .words import RobotWord, count_equal, parse
 
 SAMPLES = 10
 """Closed configurations at which an exact verdict is confirmed."""
@@ -65,7 +65,7 @@ def entry(text: str) -> dict[str, Any]:
     return {**record, **found.record(drawn, [joint.name for joint in drawn.joints.values() if joint.actuated])}
 
 
-def model(word: RobotWord) -> RobotWord:
+def model(word: ArchitectureKey) -> ArchitectureKey:
     """The architecture that is studied for all that differ from it by their motors alone.
 
     It has a motor on the first R or P of each leg; but it is the word itself where that makes other links, since
@@ -90,7 +90,7 @@ class ArchitectureStudy:
 
     facts: dict[str, Any]
     attempt: int
-    encoders: Relation
+    encoders: VelocityRelation
     joints: tuple[str, ...]
     """The joint of each observation of ``encoders``."""
 
@@ -124,7 +124,7 @@ def _study_first(text: str) -> ArchitectureStudy | str:
     return reason
 
 
-def _study(word: RobotWord, attempt: int) -> ArchitectureStudy:
+def _study(word: ArchitectureKey, attempt: int) -> ArchitectureStudy:
     kinds = _kinds(word)
     return study(mechanism(word, attempt), lambda size: _choices(kinds, size), attempt)
 
@@ -136,28 +136,28 @@ def study(
     which some may be equal but for the names of legs: the first of these. Raises ``NotConfirmed`` where the verdict is
     not exact, unless it need not be ``proved``.
     """
-    setting = observe(drawn, samples=SAMPLES)
-    if not setting.dof:
-        raise NotConfirmed(setting.robot.name, "its platform does not move")
-    derivation = derive(setting, unchecked=False)
-    exact = architecture(setting) if proved or derivation.exact.exact else None
+    setup = observe(drawn, samples=SAMPLES)
+    if not setup.dof:
+        raise NotConfirmed(setup.robot.name, "its platform does not move")
+    derivation = derive(setup, unchecked=False)
+    exact = architecture(setup) if proved or derivation.exact.exact else None
     if exact is not None:
-        _agree(exact, setting.samples, derivation.verdict)
-    fewest = _smallest(setting, exact, sets, derivation.verdict)
+        _agree(exact, setup.samples, derivation.verdict)
+    fewest = _smallest(setup, exact, sets, derivation.verdict)
     facts = {
         "hidden": derivation.hidden_architecture and derivation.hidden_architecture.ascii,
         "steps": _steps(derivation.taken),
-        "legs": len(setting.segments),
-        "dof": setting.dof,
-        "motion": _motion(setting),
-        "mobility": setting.mobility.total,
-        "idle": setting.mobility.idle,
+        "legs": len(setup.segments),
+        "dof": setup.dof,
+        "motion": _motion(setup),
+        "mobility": setup.mobility.total,
+        "idle": setup.mobility.internal,
         "verdict": derivation.verdict.verdict,
         "rank": derivation.verdict.rank,
         "exact": derivation.exact.exact,
         "instances": derivation.exact.instances,
-        "confirmed": len(setting.configurations),
-        "lost": [_general(freedom.name) for freedom in derivation.verdict.lost],
+        "confirmed": len(setup.configurations),
+        "lost": [_general(freedom.name) for freedom in derivation.verdict.unobserved],
         "minimal": [list(each) for each in fewest],
         "fewest": len(fewest[0]) if fewest else 0,
         "condition": None,
@@ -168,10 +168,10 @@ def study(
         "cure": None,
     }
     if derivation.verdict.verdict == CONTROLLABLE:
-        facts.update(_singular(setting), **_modes(setting, fewest))
+        facts.update(_singular(setup), **_modes(setup, fewest))
     else:
-        facts["cure"] = _cure(advise(setting, most=1))
-    return ArchitectureStudy(facts, attempt, *_encoders(setting))
+        facts["cure"] = _cure(advise(setup, most=1))
+    return ArchitectureStudy(facts, attempt, *_encoders(setup))
 
 
 def smallest_sets(record: Mapping[str, Any], drawn: Mechanism) -> list[dict[str, Any]]:
@@ -180,26 +180,26 @@ def smallest_sets(record: Mapping[str, Any], drawn: Mechanism) -> list[dict[str,
     the record counts, None for the others."""
     if not record.get("minimal"):
         return []
-    setting, found = observe(drawn, samples=SAMPLES), []
+    setup, found = observe(drawn, samples=SAMPLES), []
     for legs in record["minimal"]:
         hidden, problem, near = record.get("hidden"), None, None
-        if len(legs) < len(_watch(setting)):
+        if len(legs) < len(_watch(setup)):
             try:
-                form = derive(_observing(setting, legs), unchecked=False).hidden_architecture
+                form = derive(_observing(setup, legs), unchecked=False).hidden_architecture
                 hidden = None if form is None else form.ascii
             except HrsynthError as error:
                 hidden, problem = None, str(error).splitlines()[0]
         if legs == record.get("modes_legs"):
             with suppress(HrsynthError):
-                near = len(modes(_observing(setting, legs)).near)
+                near = len(modes(_observing(setup, legs)).near_modes)
         found.append({"legs": list(legs), "hidden": hidden, "problem": problem, "near": near})
     return found
 
 
 def _agree(exact: ExactArchitecture, samples: Samples, found: Verdict) -> None:
     """Raise ``NotConfirmed`` unless the exact verdict is that of the closed configurations."""
-    generic = exact.verdict(samples.question.observations)
-    if not generic.exact or (generic.basis and generic.basis.observed) or generic.chance > PROVED_CHANCE:
+    generic = exact.verdict(samples.observation_model.observations)
+    if not generic.exact or (generic.basis and generic.basis.sampled) or generic.chance > PROVED_CHANCE:
         raise NotConfirmed(exact.mechanism.name, generic.reason)
     if generic.rank != found.rank:
         raise NotConfirmed(
@@ -209,17 +209,17 @@ def _agree(exact: ExactArchitecture, samples: Samples, found: Verdict) -> None:
         )
 
 
-def _watch(setting: ObservedRobot) -> tuple[Observation, ...]:
+def _watch(setup: ObservedRobot) -> tuple[Observation, ...]:
     """The segments of all legs, or what is seen instead."""
-    return setting.segments if all(each.by_segment for each in setting.observed) else setting.observed
+    return setup.segments if all(each.by_segment for each in setup.observed) else setup.observed
 
 
-def _observing(setting: ObservedRobot, legs: Sequence[str]) -> ObservedRobot:
+def _observing(setup: ObservedRobot, legs: Sequence[str]) -> ObservedRobot:
     """The robot of which these legs are observed, or these of what is observed instead."""
-    return replace(setting, observed=tuple(each for each in _watch(setting) if each.leg in legs))
+    return replace(setup, observed=tuple(each for each in _watch(setup) if each.leg in legs))
 
 
-def _kinds(word: RobotWord) -> list[str]:
+def _kinds(word: ArchitectureKey) -> list[str]:
     """What each leg is, in the order of the labels: equal legs of one body can be exchanged; or what is seen."""
     return [str(each) for each in word.seen] or [
         f"{body}{leg}" for body, legs in enumerate(word.bodies) for leg in legs
@@ -227,7 +227,7 @@ def _kinds(word: RobotWord) -> list[str]:
 
 
 def _smallest(
-    setting: ObservedRobot,
+    setup: ObservedRobot,
     exact: ExactArchitecture | None,
     sets: Callable[[int], Iterable[tuple[int, ...]]],
     best: Verdict,
@@ -236,12 +236,12 @@ def _smallest(
     confirmed, and exact where that is asked for."""
     if not best.rank:
         return []
-    for size in range(1, len(_watch(setting)) + 1):
+    for size in range(1, len(_watch(setup)) + 1):
         found = []
         for places in sets(size):
-            seen = [_watch(setting)[i] for i in places]
-            samples = restrict_samples(setting.everything, seen, ways=False)
-            verdict = verdict_of(setting, [o.leg for o in seen], samples)
+            seen = [_watch(setup)[i] for i in places]
+            samples = restrict_samples(setup.all_samples, seen, ways=False)
+            verdict = verdict_of(setup, [o.leg for o in seen], samples)
             if exact is not None:
                 _agree(exact, samples, verdict)
             if verdict.rank == best.rank:
@@ -270,11 +270,11 @@ def _steps(steps: Sequence[Step]) -> list[str]:
     ]
 
 
-def _motion(setting: ObservedRobot) -> str:
+def _motion(setup: ObservedRobot) -> str:
     """Translations and other motions of the platform at a generic configuration: 3T, 2T1R, 1T2R, 3T3R …"""
-    twists = setting.everything.members[0].relation.twists
+    twists = setup.all_samples.members[0].relation.twists
     turns = range_basis(twists[3:], 1.0)[1].value if twists.shape[0] > 3 else 0
-    return "".join(f"{count}{letter}" for count, letter in ((setting.dof - turns, "T"), (turns, "R")) if count)
+    return "".join(f"{count}{letter}" for count, letter in ((setup.dof - turns, "T"), (turns, "R")) if count)
 
 
 def _general(name: str) -> str:
@@ -283,23 +283,25 @@ def _general(name: str) -> str:
     return re.split(r" of pitch| (?:along|about the line through|about) \(", name)[0]
 
 
-def _singular(setting: ObservedRobot) -> dict[str, Any]:
+def _singular(setup: ObservedRobot) -> dict[str, Any]:
     """When the hidden robot loses a freedom, in words; None where that is not known in words."""
-    return {"condition": MeasuredRobot.of_directions(setting).condition.words}
+    return {"condition": MeasuredRobot.of_directions(setup).condition.words}
 
 
-def _modes(setting: ObservedRobot, fewest: Sequence[Sequence[str]]) -> dict[str, Any]:
+def _modes(setup: ObservedRobot, fewest: Sequence[Sequence[str]]) -> dict[str, Any]:
     """Complex assembly modes of a smallest set of legs, by what there are no more if not by a resultant, and the most
     real ones of some configurations: of the first set, or else of that of which fewest can be expected."""
-    robots = [MeasuredRobot.of_directions(_observing(setting, legs)) for legs in fewest]
-    at = setting.configurations[0]
+    robots = [MeasuredRobot.of_directions(_observing(setup, legs)) for legs in fewest]
+    at = setup.configurations[0]
 
     def tried() -> Iterator[int]:
         yield 0
         yield from sorted(range(1, len(fewest)), key=lambda k: expected_modes(robots[k], at))[:OTHERS]
 
     for k in tried():
-        found = [each for each in _lists(robots[k], setting.configurations) if each.complete and not each.continuum]
+        found = [
+            each for each in _lists(robots[k], setup.configurations) if each.complete and not each.continuous_family
+        ]
         bounds = [each.complex for each in found if each.complex is not None]
         if bounds:
             return {
@@ -320,10 +322,10 @@ def _lists(measured: MeasuredRobot, configurations: Sequence[ClosedConfiguration
             return
         try:
             found = counted_modes(measured, at)
-        except (NotConfined, Unsolved, MissingExtra, BadRequest):
+        except (UnsupportedLocus, SystemNotSolved, MissingExtra, BadRequest):
             return
         yield found
-        if found.open or found.continuum is not None:  # for the architecture: the configuration is a random one
+        if found.open or found.continuous_family is not None:  # for the architecture: the configuration is a random one
             return
         if found.bound != "resultant":
             count = 1 if found.bound == "rank" or (found.complex or 0) > LISTED_ONCE else FEWER
@@ -339,12 +341,10 @@ def _cure(found: Advice) -> str:
     return first if found.cured else f"not all by {first}"
 
 
-def _encoders(setting: ObservedRobot) -> tuple[Relation, tuple[str, ...]]:
+def _encoders(setup: ObservedRobot) -> tuple[VelocityRelation, tuple[str, ...]]:
     """What encoders on all joints see at a configuration, and the joint of each."""
     every = [
-        (joint.name, each)
-        for joint in setting.mechanism.joints.values()
-        for each in encoders(setting.mechanism, joint, "")
+        (joint.name, each) for joint in setup.mechanism.joints.values() for each in encoders(setup.mechanism, joint, "")
     ]
-    question = replace(setting.everything.question, observations=tuple(each for _, each in every))
-    return relation(setting.configurations[0], question), tuple(name for name, _ in every)
+    question = replace(setup.all_samples.observation_model, observations=tuple(each for _, each in every))
+    return relation(setup.configurations[0], question), tuple(name for name, _ in every)

@@ -14,25 +14,25 @@ from typing import cast
 
 import numpy as np
 
-from ..description.sights import SightSpec, with_sights
+from ..description.observation_text import ObservationSpec, with_sights
 from ..errors import BadRequest
 from ..geometry.vectors import Array, perpendicular, pose, rotation_about, unit
 from ..mechanism.builder import Builder
+from ..mechanism.cameras import CameraObservation, NamedCamera
 from ..mechanism.legs import decompose
 from ..mechanism.model import Mechanism
 from ..mechanism.normal import normal_form
 from ..mechanism.observations import kinds
 from ..mechanism.observations.direction import Direction
 from ..mechanism.sensors import default_observation, observation_of
-from ..mechanism.sights import CameraObservation, NamedCamera
 from ..tolerances import SQUARE_AXES
-from .words import COMPOSITE, JointSymbol, LegWord, RobotWord
+from .architecture_key import COMPOSITE, ArchitectureKey, JointSymbol, LegKey
 
 Z = np.array([0.0, 0.0, 1.0])
 
 
 @lru_cache(maxsize=8)
-def mechanism(word: RobotWord, attempt: int = 0) -> Mechanism:
+def mechanism(word: ArchitectureKey, attempt: int = 0) -> Mechanism:
     """The mechanism of a word: geometry from the word without its motors and the number of the attempt, metres.
 
     Raises ``BadRequest`` where the axes of a U cannot be at right angles.
@@ -41,14 +41,14 @@ def mechanism(word: RobotWord, attempt: int = 0) -> Mechanism:
     return _with_sights(drawn, word, attempt) if word.seen else drawn
 
 
-def _with_sights(drawn: Mechanism, word: RobotWord, attempt: int) -> Mechanism:
+def _with_sights(drawn: Mechanism, word: ArchitectureKey, attempt: int) -> Mechanism:
     """The mechanism with what the word says to be seen of its platform: places, axes and cameras in general position.
 
     The cameras see upwards from below the platform.
     """
     rng = np.random.default_rng(np.frombuffer(sha256(f"{word.unmoved} {attempt} seen".encode()).digest(), np.uint32))
     centre = drawn.links["platform"].pose[:3, 3]
-    cameras, specs = dict[str, NamedCamera](), list[SightSpec]()
+    cameras, specs = dict[str, NamedCamera](), list[ObservationSpec]()
     for number, each in enumerate(word.seen, 1):
         kind, name = kinds()[each.kind], f"camera_{number}" if each.own else "camera"
         by_camera = issubclass(kind, CameraObservation)
@@ -57,7 +57,7 @@ def _with_sights(drawn: Mechanism, word: RobotWord, attempt: int) -> Mechanism:
             cameras[name] = NamedCamera(name, "base", pose(at, rotation_about(rng.normal(size=3), 0.2)))
         at, axis = 0.12 * rng.normal(size=3), unit(rng.normal(size=3))
         specs.append(
-            SightSpec(
+            ObservationSpec(
                 each.kind,
                 "platform",
                 f"{each.kind}_{number}",
@@ -70,7 +70,7 @@ def _with_sights(drawn: Mechanism, word: RobotWord, attempt: int) -> Mechanism:
     return with_sights(replace(drawn, observations=()), specs, cameras.values())
 
 
-def planar(word: RobotWord) -> bool:
+def planar(word: ArchitectureKey) -> bool:
     """Whether all that a word's legs do, they do in the plane normal to z."""
     return all(_in_plane(joint) for leg in word.legs for joint in leg.joints)
 
@@ -83,7 +83,7 @@ def _in_plane(joint: JointSymbol) -> bool:
 class _Draft:
     """A mechanism in the making."""
 
-    def __init__(self, word: RobotWord, attempt: int) -> None:
+    def __init__(self, word: ArchitectureKey, attempt: int) -> None:
         self.word = word
         seed = sha256(f"{word.unmoved} {attempt}".encode()).digest()
         self.rng = np.random.default_rng(np.frombuffer(seed, dtype=np.uint32))
@@ -137,17 +137,17 @@ class _Draft:
                 return ("platform",)
 
 
-def _with_segments(drawn: Mechanism, word: RobotWord, chords: Mapping[str, Direction]) -> Mechanism:
+def _with_segments(drawn: Mechanism, word: ArchitectureKey, chords: Mapping[str, Direction]) -> Mechanism:
     """The mechanism with the segments that the word marks, and the chord of the last link (``chords``, by leg) where
     a leg has no segment by the rules, since its axes meet in a point."""
-    anatomy = decompose(normal_form(drawn).mechanism)
+    decomposition = decompose(normal_form(drawn).mechanism)
     found: list[Direction] = []
-    for (label, chord), leg, limb in zip(chords.items(), word.legs, anatomy.legs, strict=True):
+    for (label, chord), leg, limb in zip(chords.items(), word.legs, decomposition.legs, strict=True):
         try:
             segment = (
-                default_observation(anatomy, limb, last=True)
+                default_observation(decomposition, limb, last=True)
                 if leg.observed is None
-                else observation_of(anatomy, chord.link)
+                else observation_of(decomposition, chord.link)
             )
         except BadRequest:
             found.append(chord)
@@ -158,14 +158,17 @@ def _with_segments(drawn: Mechanism, word: RobotWord, chords: Mapping[str, Direc
         return drawn
     told = {each.leg: each for each in found}
     return replace(
-        drawn, observations=tuple(told.get(leg.label) or default_observation(anatomy, leg) for leg in anatomy.legs)
+        drawn,
+        observations=tuple(
+            told.get(leg.label) or default_observation(decomposition, leg) for leg in decomposition.legs
+        ),
     )
 
 
 class _Limb:
     """A leg in the making: its centres from the foot to the tip, then its joints."""
 
-    def __init__(self, draft: _Draft, leg: LegWord, number: int, angle: float, end: str) -> None:
+    def __init__(self, draft: _Draft, leg: LegKey, number: int, angle: float, end: str) -> None:
         self.draft, self.leg, self.number, self.end, self.rng = draft, leg, number, end, draft.rng
         self.radius = np.array([np.cos(angle), np.sin(angle), 0.0])
         self.tangent = np.cross(Z, self.radius)

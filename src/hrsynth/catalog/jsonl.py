@@ -9,7 +9,7 @@ from typing import Any
 
 from ..budgets import LARGEST_RECORD
 from ..errors import BadRequest
-from .words import VERSION
+from .architecture_key import VERSION
 
 Record = Mapping[str, Any]
 """What the catalog says of one architecture; a field that is missing is not known or does not apply."""

@@ -8,8 +8,8 @@ import tomllib
 from functools import cache
 from importlib import resources
 
+from .architecture_key import parse
 from .jsonl import Record
-from .words import parse
 
 
 @cache

@@ -14,11 +14,11 @@ from typing import Any
 from ..budgets import MOST_READ_PARTS
 from ..errors import BadRequest
 from ..results import Value
+from .architecture_key import SENSORS, parse
 from .conditions import places, require_askable
 from .jsonl import Record, leading_word, record
 from .known import alias, is_called, order
 from .store import DATABASES, ShippedCatalogs, Store, shipped_folder, store
-from .words import SENSORS, parse
 
 
 class ReadRecords(Sequence[Record]):

@@ -18,10 +18,10 @@ from ..budgets import LARGEST_CATALOG, LARGEST_RECORD, MOST_RECORDS
 from ..description.files import open_regular, replacement
 from ..errors import BadRequest, BuildStopped
 from ..untrusted import gunzip
+from .architecture_key import VERSION
 from .conditions import RecordQuestion, fill, places
 from .journal import ENDING, Journal
 from .jsonl import FLAGS, decode_lines, encode_lines, head_count, leading_word, record, require_version
-from .words import VERSION
 
 DATABASES = (".sqlite", ".sqlite3", ".db")
 """Endings of a store that is one SQLite file."""

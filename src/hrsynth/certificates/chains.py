@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.modes.carried import CarriedPlatform, Told, Turn, permanent
-from ..analysis.modes.carried_modes import enclose_zeros, proposals
+from ..analysis.modes.carrying_leg_modes import enclose_zeros, proposals
+from ..analysis.modes.carrying_leg_system import CarriedCondition, CarriedPlatform, Turn, permanent
 from ..analysis.modes.conditions import AtAngle, OnPlane, OnRevolution
 from ..analysis.modes.quadrics import UNIT
 from ..analysis.modes.single_loop import SingleLoop, dual_product
@@ -124,7 +124,7 @@ def _carried_chain(system: CarriedPlatform, found: Sequence[Array]) -> ToldChain
     return ToldChain.of(record, starts, [x - off for x in found], off)
 
 
-def _carriers(told: Told) -> list[int]:
+def _carriers(told: CarriedCondition) -> list[int]:
     """The joints that change what is told."""
     return [k for k in range(told.joints) if k not in told.idle]
 
@@ -149,7 +149,7 @@ def _unit(v: Array) -> list[Fraction]:
     return found
 
 
-def _displaced_tip(each: Told, R: Array, p: Array) -> tuple[Any, Any, int]:
+def _displaced_tip(each: CarriedCondition, R: Array, p: Array) -> tuple[Any, Any, int]:
     """A tip, or an arrow, displaced, and the plane or sphere on which it is."""
     c = each.condition
     b = write_numbers(_near(p + R @ c.b))

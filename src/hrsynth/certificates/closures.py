@@ -43,12 +43,12 @@ class ClosedRobot:
     @classmethod
     def of(cls, found: AssemblyModes) -> ClosedRobot | None:
         """None where a joint or a measurement is of a kind that the checker does not know."""
-        mechanism = found.setting.mechanism
+        mechanism = found.setup.mechanism
         held = list(_held_measurements(found))
         kinds = {joint.type for joint in mechanism.joints.values()}
         if mechanism.couplings or not held or None in held or JointType.FREE in kinds or found.model is None:
             return None
-        length = found.goal.twin.length
+        length = found.goal.model.length
         joints = [
             [
                 joint.type.value,
@@ -79,7 +79,7 @@ class ClosedRobot:
 
     def links(self, at: ClosedConfiguration) -> dict[str, Any]:
         """The displacements of all links."""
-        mechanism = self.found.setting.mechanism
+        mechanism = self.found.setup.mechanism
         return {link: write_numbers(displacement(mechanism, at, link)) for link in mechanism.links}
 
     def places(
@@ -93,12 +93,12 @@ class ClosedRobot:
     ) -> dict[str, Any]:
         """A system's frame, and its tips as points or, the last, arrows of the robot's links, by where they are at a
         configuration in working coordinates."""
-        names = leg_ends(self.found.setting.anatomy) if self.found.confined is None else self.found.confined.bodies
-        length, found = at.twin.length, []
+        names = leg_ends(self.found.setup.decomposition) if self.found.confined is None else self.found.confined.bodies
+        length, found = at.model.length, []
         for k, (body, tip) in enumerate(zip(bodies, tips, strict=True)):
             link, point = names[body], float(k < len(tips) - arrows)
             there = np.array(tip, dtype=float) - (1.0 - point) * np.array(hub, dtype=float)[: len(tip)]
-            D = displacement(self.found.setting.mechanism, at, link)
+            D = displacement(self.found.setup.mechanism, at, link)
             v = (point * frame.origin + frame.size * there @ frame.R) / length - point * D[:, 3]
             found.append([link, [*write_numbers(D[:, :3].T @ v), str(int(point))]])
         return {"frame": write_numbers([frame.origin / length, *frame.R, [frame.size / length]]), "tips": found}
@@ -107,19 +107,21 @@ class ClosedRobot:
 def displacement(mechanism: Mechanism, at: ClosedConfiguration, link: str) -> Array:
     """D of a link since the zero configuration of a mechanism, shape (3, 4)."""
     X = at.pose(link) @ inverse(mechanism.links[link].pose)
-    return np.column_stack([X[:3, :3], X[:3, 3] / at.twin.length])
+    return np.column_stack([X[:3, :3], X[:3, 3] / at.model.length])
 
 
 def _held_measurements(found: AssemblyModes) -> Iterator[list[Any] | None]:
     """What is measured: a link's directions and points, the link from which they are seen, and how they are seen at the
     goal; None of another kind."""
-    setting, at = found.setting, found.goal
-    measured = MeasuredRobot.of(setting, found.kind == "real")
-    observations, mechanism = measured.question.observations, setting.mechanism
+    setup, at = found.setup, found.goal
+    measured = MeasuredRobot.of(setup, found.kind == "real")
+    observations, mechanism = measured.observation_model.observations, setup.mechanism
     for each in observations:
         if isinstance(each, Direction):
             d = mechanism.links[each.link].pose[:3, :3] @ each.direction
-            yield _seen_values(mechanism, at, each.link, each.seen_from or measured.question.reference, [*d, 0.0])
+            yield _seen_values(
+                mechanism, at, each.link, each.seen_from or measured.observation_model.reference, [*d, 0.0]
+            )
         elif isinstance(each, Encoder):
             joint = mechanism.joints[each.joint]
             if sum(isinstance(o, Encoder) and o.joint == each.joint for o in observations) < joint.type.freedoms:
@@ -131,7 +133,7 @@ def _held_measurements(found: AssemblyModes) -> Iterator[list[Any] | None]:
 
 
 def _locked_joints(mechanism: Mechanism, at: ClosedConfiguration, joint: Joint) -> Iterator[list[Any]]:
-    for x in ([1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [*joint.point / at.twin.length, 1.0]):
+    for x in ([1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [*joint.point / at.model.length, 1.0]):
         yield _seen_values(mechanism, at, joint.successor, joint.predecessor, x)
 
 

@@ -17,8 +17,8 @@ import numpy as np
 
 from ..analysis.measured import MeasuredRobot
 from ..analysis.modes.branches import Model
-from ..analysis.modes.carried import CarriedPlatform
-from ..analysis.modes.carried_modes import solve_carried
+from ..analysis.modes.carrying_leg_modes import solve_carried
+from ..analysis.modes.carrying_leg_system import CarriedPlatform
 from ..analysis.modes.modes import AssemblyModes, modes
 from ..analysis.modes.planar_loops import PlanarLoops
 from ..analysis.modes.planar_reading import planar_loops
@@ -26,7 +26,7 @@ from ..analysis.modes.quadrics import WorkingFrame
 from ..analysis.modes.single_loop import SingleLoop, solve_loop
 from ..analysis.modes.solve import SystemModes
 from ..analysis.observed import ObservedRobot
-from ..errors import NoCertificate, NotConfined, Unsolved
+from ..errors import NoCertificate, SystemNotSolved, UnsupportedLocus
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism import Mechanism
@@ -51,15 +51,15 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
     """The certificate of a list of modes, accepted by the checker; raises ``NoCertificate`` where the list is not
     complete or no bound of the checker proves the count."""
     if found.formation is not None:
-        raise NoCertificate(found.setting.robot.name, "the checker knows no formations")
+        raise NoCertificate(found.setup.robot.name, "the checker knows no formations")
     about = {
-        "robot": found.setting.robot.name,
+        "robot": found.setup.robot.name,
         "kind": found.kind,
         "at": found.pose.to_dict(),
-        "observed": [[o.leg, o.link if o.by_segment else o.leg] for o in found.setting.observed],
+        "observed": [[o.leg, o.link if o.by_segment else o.leg] for o in found.setup.observed],
     }
     if found.found.complete and not found.found.solved and found.confined is not None:  # a copy: solved again
-        found = modes(found.setting, at=found.goal, real=found.kind == "real", as_written=found.confined.as_written)
+        found = modes(found.setup, at=found.goal, real=found.kind == "real", as_written=found.confined.as_written)
     robot = ClosedRobot.of(found)
     try:
         system = None if found.model is None else found.model.system
@@ -70,7 +70,7 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
                 other = solve_carried if isinstance(system, SingleLoop) else solve_loop
                 return _as_chain(found, about, robot, reason, other)
         if found.found.complete and not found.found.solved:
-            with suppress(NotConfined):
+            with suppress(UnsupportedLocus):
                 return of_loops(found, about, robot)
         try:
             return of_systems(found.found, about, robot)
@@ -79,7 +79,7 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
                 raise
             return _as_chain(found, about, robot, reason, solve_carried, solve_loop)
     except NotAccepted as reason:
-        raise NoCertificate(found.setting.robot.name, str(reason)) from None
+        raise NoCertificate(found.setup.robot.name, str(reason)) from None
 
 
 def of_systems(found: SystemModes, about: Mapping[str, Any], robot: ClosedRobot | None = None) -> dict[str, Any]:
@@ -98,7 +98,8 @@ def of_systems(found: SystemModes, about: Mapping[str, Any], robot: ClosedRobot 
 
 
 def of_loops(found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot | None) -> dict[str, Any]:
-    """The certificate of the modes of a planar mechanism from its joints; raises ``NotAccepted``, ``NotConfined``."""
+    """The certificate of the modes of a planar mechanism from its joints; raises ``NotAccepted``,
+    ``UnsupportedLocus``."""
     system = None if found.model is None else found.model.system
     if not isinstance(system, PlanarLoops):
         system = planar_loops(_measured_robot(found), found.goal)
@@ -143,7 +144,7 @@ def _as_chain(
     ``NotAccepted``."""
     assert found.model is not None
     for way in ways:
-        with suppress(NotConfined, Unsolved, NotAccepted):
+        with suppress(UnsupportedLocus, SystemNotSolved, NotAccepted):
             model, listed = way(_measured_robot(found), found.goal, found.model.system.error)
             system = model.system
             if listed.complete and listed.complex == found.found.complex and isinstance(system, CarriedPlatform):
@@ -153,7 +154,7 @@ def _as_chain(
 
 def _measured_robot(found: AssemblyModes) -> MeasuredRobot:
     """What the list holds."""
-    return MeasuredRobot.of(found.setting, found.kind == "real")
+    return MeasuredRobot.of(found.setup, found.kind == "real")
 
 
 def _seal(
@@ -181,9 +182,9 @@ def again(record: dict[str, Any], robot: Mechanism) -> dict[str, Any]:
     }
     at = Pose(**parts)
     real = record["kind"] == "real"
-    setting = ObservedRobot.of(robot, None if real else [link for _, link in record["observed"]], driven=real)
-    start = setting.motion.pose(setting.everything.start.pose(setting.motion.link))
-    return certificate(modes(setting, at=None if start == at else at, real=real))
+    setup = ObservedRobot.of(robot, None if real else [link for _, link in record["observed"]], driven=real)
+    start = setup.motion.pose(setup.all_samples.start.pose(setup.motion.link))
+    return certificate(modes(setup, at=None if start == at else at, real=real))
 
 
 def _system(proposed: ProposedRecord, robot: ClosedRobot | None) -> dict[str, Any]:

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.aspects.path import Aspects, PathAnswer, between_poses
+from ..analysis.aspects.path import PathAnswer, PathPlanner, between_poses
 from ..analysis.aspects.path_segments import StraightSegment
 from ..analysis.aspects.vector_expressions import DerivedVector, LegVector, VectorExpression, limbs_of
-from ..analysis.aspects.words import SEPARATED
+from ..analysis.aspects.verdicts import SEPARATED
 from ..analysis.observed import ObservedRobot
 from ..closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, SlidingRod
 from ..closed_forms.platform_points import PlatformPoint
@@ -38,12 +38,12 @@ Node = list[Any]
 
 def certificate(found: PathAnswer) -> dict[str, Any]:
     """The certificate of a proved answer; raises ``NoCertificate``."""
-    name = found.setting.robot.name
+    name = found.setup.robot.name
     if not found.certified:
         raise NoCertificate(name, found.reason or "no path was proved")
-    if not all(o.by_segment for o in found.setting.observed):
+    if not all(o.by_segment for o in found.setup.observed):
         raise NoCertificate(name, "what is observed is not the direction of a segment")
-    aspects = Aspects.of(found.setting)
+    aspects = PathPlanner.of(found.setup)
     assert not isinstance(aspects.pattern, str)
     assert isinstance(aspects.condition, Named)
     forms, motion = aspects.enclosure(found.start.configuration).forms, WrittenMotions.of(aspects)
@@ -53,12 +53,12 @@ def certificate(found: PathAnswer) -> dict[str, Any]:
             "claim": "path",
             "robot": name,
             "verdict": found.verdict,
-            "observed": [[o.leg, o.link] for o in found.setting.observed],
+            "observed": [[o.leg, o.link] for o in found.setup.observed],
             "any_mode": found.any_mode,
             "start": found.start.pose.to_dict(),
             "goal": found.goal.pose.to_dict(),
             "motion": motion.to_dict(),
-            "legs": [_leg(limb) for limb in forms.limbs],
+            "legs": [_leg(limb) for limb in forms.subchains],
             "modes": [list(map(int, forms.modes))],
             "vectors": {symbol: _vector(each) for symbol, each in sorted(forms.vectors.items())},
             "points": list(forms.points),
@@ -78,8 +78,8 @@ def certificate(found: PathAnswer) -> dict[str, Any]:
             ends = aspects.pattern.coordinates.of([found.start.configuration, found.goal.configuration])
             record["path"] = [motion.node(p, R, None) for p, R in zip(*ends, strict=True)]
         else:
-            ways = [way for way in found.ways if isinstance(way, StraightSegment)]
-            record["path"] = _cut(record, motion, ways, len(found.ways))
+            ways = [way for way in found.segments if isinstance(way, StraightSegment)]
+            record["path"] = _cut(record, motion, ways, len(found.segments))
         record["modes"] = [list(modes) for modes in record["modes"]]
         record["ends"] = [record["path"][0], record["path"][-1]]
         record["sha256"] = digest(record)
@@ -100,7 +100,7 @@ class WrittenMotions:
     about: Array
 
     @classmethod
-    def of(cls, aspects: Aspects) -> WrittenMotions:
+    def of(cls, aspects: PathPlanner) -> WrittenMotions:
         """The motions that the robot shows."""
         assert not isinstance(aspects.pattern, str)
         coordinates = aspects.pattern.coordinates
@@ -141,9 +141,9 @@ def _reduced(rows: Array) -> Array:
 
 def again(record: dict[str, Any], robot: Mechanism) -> dict[str, Any]:
     """The certificate of the same question about a robot."""
-    setting = ObservedRobot.of(robot, [link for _, link in record["observed"]])
+    setup = ObservedRobot.of(robot, [link for _, link in record["observed"]])
     ends = [_pose(record[end]) for end in ("start", "goal")]
-    return certificate(between_poses(setting, ends, any_mode=bool(record["any_mode"])))
+    return certificate(between_poses(setup, ends, any_mode=bool(record["any_mode"])))
 
 
 def _pose(record: dict[str, Any]) -> Pose:

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.modes.curves import Circle, Line, Point
+from ..analysis.modes.loci import Circle, Line, Point
 from ..analysis.modes.planar_loops import PlanarLoop, PlanarLoops
 from ..analysis.modes.planar_modes import enclosures, is_excluded
 from ..analysis.modes.quadrics import WorkingFrame
-from ..analysis.modes.solve import Solved
-from ..analysis.modes.squares import SquareSystem
+from ..analysis.modes.solve import SquareSolution
+from ..analysis.modes.square_systems import SquareSystem
 from ..geometry.vectors import Array, cross, rotation_about
 from .closures import round_numbers, write_numbers
 from .proposed import ProposedRecord, placed_in, starts_of
@@ -93,7 +93,9 @@ def _vectors(loop: PlanarLoop) -> list[Any]:
     return [[write_numbers(round_numbers([a.real, a.imag])), k, list(e)] for (k, e), a in loop.terms.items()]
 
 
-def planar_system(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], bool | None]], list[Array]]:
+def planar_system(
+    solved: SquareSolution,
+) -> tuple[dict[str, Any], list[tuple[list[complex], bool | None]], list[Array]]:
     """A platform in a plane as loops: of the first leg's tip, the platform and another leg's tip. The angles are the
     platform's and those of spokes of circles, the slides are along lines."""
     system, part = solved.system, solved.part

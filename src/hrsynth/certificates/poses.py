@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.modes.curves import Plane, Sphere
+from ..analysis.modes.loci import Plane, Sphere
+from ..analysis.modes.pose_coordinate_solver import by_homotopy
 from ..analysis.modes.quadrics import BITS, PoseSystem
 from ..analysis.modes.rigid import Spatial
-from ..analysis.modes.wholes import by_homotopy
 from ..geometry.so3 import quaternions
 from ..geometry.vectors import Array
 from .closures import write_numbers

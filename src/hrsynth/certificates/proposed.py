@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..analysis.modes.quadrics import WorkingFrame
-from ..analysis.modes.roots import Roots, is_real
+from ..analysis.modes.roots import SolutionSet, is_real
 from ..geometry.vectors import Array
 
 
@@ -27,7 +27,7 @@ class ProposedRecord:
     frame: WorkingFrame
 
 
-def starts_of(roots: Roots) -> tuple[list[list[complex]], list[bool | None]]:
+def starts_of(roots: SolutionSet) -> tuple[list[list[complex]], list[bool | None]]:
     """About where the solutions are, and which of them are real; None for those that are too far to be poses."""
     return (
         [[complex(v) for v in each] for each in (*roots.values, *roots.distant)],

@@ -22,13 +22,13 @@ def certificate(found: Derivation) -> dict[str, Any]:
 
     The legs see rank [A; X] + rank [A; Y] − rank [A; Y; X] − rank A of the platform's freedoms. Raises
     ``NoCertificate`` where there are no instances."""
-    exact, name = architecture(found.setting), found.robot.name
+    exact, name = architecture(found.setup), found.robot.name
     try:
         at = exact.instance(0)
     except NotRecognised as reason:
         raise NoCertificate(name, str(reason)) from None
-    places = [i for i, o in enumerate(exact.observations) if o.key in {each.key for each in found.setting.observed}]
-    if len(places) < len(found.setting.observed):
+    places = [i for i, o in enumerate(exact.observations) if o.key in {each.key for each in found.setup.observed}]
+    if len(places) < len(found.setup.observed):
         raise NoCertificate(name, "not all that is measured is rational")
     matrices = {"A": at.loops, "X": at.rows[0], "Y": np.vstack([at.rows[1 + i] for i in places])}
     whole = {key: [[int(c) for c in row] for row in rows] for key, rows in matrices.items()}
@@ -36,7 +36,7 @@ def certificate(found: Derivation) -> dict[str, Any]:
         "format": "hrsynth-certificate-1",
         "claim": "ranks",
         "robot": name,
-        "observed": [[o.leg, o.link] for o in found.setting.observed],
+        "observed": [[o.leg, o.link] for o in found.setup.observed],
         "matrices": whole,
         "stacks": [
             _stack(of, whole)

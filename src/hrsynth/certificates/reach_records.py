@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.modes.curves import Circle, Line, Point, Reach, Sphere
+from ..analysis.modes.loci import Circle, Line, Point, Reach, Sphere
 from ..analysis.modes.quadrics import UNIT, Rounded, WorkingFrame, direction, spokes
 from ..geometry.so3 import quaternions
 from ..geometry.vectors import cross, unit

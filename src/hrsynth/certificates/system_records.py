@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.modes.curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, shift_reach
+from ..analysis.modes.loci import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, shift_reach
 from ..analysis.modes.quadrics import PoseSystem, WorkingFrame
 from ..analysis.modes.rigid import Planar, Spatial
-from ..analysis.modes.solve import Solved
-from ..analysis.modes.squares import TURNS, SquareSystem
+from ..analysis.modes.solve import SquareSolution
+from ..analysis.modes.square_systems import TURNS, SquareSystem
 from ..analysis.modes.translating import Articulated, Translating, coplanar, met_normal
 from ..geometry.vectors import Array
 from .closures import ClosedRobot, round_numbers, write_numbers
@@ -24,7 +24,7 @@ from .reach_records import point_on, reach_record
 from .verify_certificate import NotAccepted
 
 
-def propose(solved: Solved, robot: ClosedRobot | None) -> ProposedRecord:
+def propose(solved: SquareSolution, robot: ClosedRobot | None) -> ProposedRecord:
     """The solutions of a square part of a system."""
     record, starts, poses = _write_system(solved)
     frame = solved.part.chart.frame if isinstance(solved.part, PoseSystem) else solved.part.frame
@@ -39,7 +39,9 @@ def propose(solved: Solved, robot: ClosedRobot | None) -> ProposedRecord:
     )
 
 
-def _write_system(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], bool | None]], list[Array]]:
+def _write_system(
+    solved: SquareSolution,
+) -> tuple[dict[str, Any], list[tuple[list[complex], bool | None]], list[Array]]:
     """A system in rational numbers without boxes and bound; about where its solutions are, and whether they are real;
     the real ones' poses, as the checker is told them."""
     system, part, roots = solved.system, solved.part, solved.roots
@@ -87,7 +89,7 @@ def _shift_pose(X: Array, frame: WorkingFrame, origin: Array) -> Array:
     return np.column_stack([np.eye(3), frame.vector(X[:3, 3] - origin)])
 
 
-def _pose_system(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], bool | None]], list[Array]]:
+def _pose_system(solved: SquareSolution) -> tuple[dict[str, Any], list[tuple[list[complex], bool | None]], list[Array]]:
     """As :func:`_write_system`, for tips on surfaces too, solved for in the pose's own coordinates."""
     system, part = solved.system, solved.part
     assert isinstance(part, PoseSystem)

@@ -9,12 +9,12 @@ import os
 import sys
 import warnings
 
-from ..errors import GuessedBase, GuessedPlatform
+from ..errors import AssumedBase, AssumedPlatform
 from . import completion, files, importing, lint, schema, studio
+from .analyses import QUESTIONS
 from .app import app as app
 from .catalog import catalog
 from .colour import close, say
-from .questions import QUESTIONS
 
 for question in QUESTIONS:
     question.add(app)
@@ -55,7 +55,7 @@ def execute(arguments: list[str] | None = None) -> int:
     """Run a command; the exit status."""
     try:
         with warnings.catch_warnings():
-            for kind in (GuessedBase, GuessedPlatform):
+            for kind in (AssumedBase, AssumedPlatform):
                 warnings.simplefilter("ignore", kind)  # a note says it
             app.main(sys.argv[1:] if arguments is None else arguments)
         sys.stdout.flush()

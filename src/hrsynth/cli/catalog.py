@@ -378,11 +378,11 @@ def _no_geometry(name: str) -> Mechanism:
 
 def _of_word(text: str, kept: str | None) -> _Shown:
     from ..catalog import load
+    from ..catalog.architecture_key import parse
     from ..catalog.drawing import drawing
     from ..catalog.entry import model
     from ..catalog.geometry import mechanism
     from ..catalog.store import ALL
-    from ..catalog.words import parse
 
     if text.isalnum() and text in (every := load(kept or ALL)) and "choices" in every[text]:
         return _Shown(every[text], "", "", partial(_no_geometry, text))
@@ -430,9 +430,9 @@ def site(output: str, workers: int, anew: bool, kept: str | None, json: bool, **
 
 def _word(text: str, kept: str | None) -> tuple[str, str]:
     """The word of an architecture that is given by it, by a name or by its legs, and what else is called so."""
+    from ..catalog.architecture_key import parse
     from ..catalog.known import alias
     from ..catalog.query import find_named
-    from ..catalog.words import parse
     from ..errors import BadRequest
 
     try:
@@ -455,11 +455,11 @@ def _word(text: str, kept: str | None) -> tuple[str, str]:
 def _known_record(word: str, kept: str | None) -> tuple[Any, str]:
     """The record of a word, and where it comes from if not from the catalog."""
     from ..catalog import load
+    from ..catalog.architecture_key import parse
     from ..catalog.build import architectures, make_records
     from ..catalog.groups import group
     from ..catalog.query import groups_of
     from ..catalog.store import shipped_folder
-    from ..catalog.words import parse
 
     own = group(parse(word))
     if kept is not None or shipped_folder().groups():

@@ -68,9 +68,9 @@ def _words(option: Option, last: str) -> Iterable[str]:
     """Its values; of robots also ``example:NAME``, once that is begun."""
     words = option.words() if callable(option.words) else option.words
     if option.words is shipped_names and last and EXAMPLE.startswith(last[: len(EXAMPLE)]):
-        from ..description import examples
+        from ..description import list_examples
 
-        return [*words, *(f"{EXAMPLE}{name}" for name in examples())]
+        return [*words, *(f"{EXAMPLE}{name}" for name in list_examples())]
     return words
 
 

@@ -52,8 +52,8 @@ class Verify(Head):
 
 def robots(examples: bool, json: bool) -> None:
     """Print the table of the shipped robots, or of those of the package example-robot-data."""
-    from ..description import examples as found
-    from ..description import shipped
+    from ..description import list_examples as found
+    from ..description import list_robots
     from ..families.table import ROBOTS
     from ..mechanism.notation import parse
     from ..present.show import record
@@ -76,7 +76,7 @@ def robots(examples: bool, json: bool) -> None:
                 )
             )
         return
-    files = shipped()
+    files = list_robots()
     if json:
         rows = [
             {

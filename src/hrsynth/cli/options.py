@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 def shipped_names() -> Iterable[str]:
     """The names of the shipped robots."""
-    from ..description import shipped
+    from ..description import list_robots
 
-    return shipped()
+    return list_robots()
 
 
 JSON = flag("json", "Print the result as one JSON object; its schema: hrsynth schema COMMAND.", OUTPUT)

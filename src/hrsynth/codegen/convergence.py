@@ -28,8 +28,8 @@ from numpy.typing import NDArray
 
 from ..analysis.branch.carried_vectors import SweptChains, Total, add_bend, row_product
 from ..analysis.branch.cells import TubeTrial, derivatives, drift, inverses, middles, residual
+from ..analysis.branch.loop_parts import LoopBlock, LoopEquation, LoopPart
 from ..analysis.branch.loops import JointLoop
-from ..analysis.branch.part import LoopBlock, LoopEquation, LoopPart
 from ..budgets import (
     BOUND_HALVINGS,
     CELLS_TOGETHER,
@@ -53,9 +53,9 @@ from ..tolerances import (
     PART_TUBE,
     UNIT_ROUNDOFF,
 )
+from .branch_cells import TubeCell, TubedBranch, TubePart
 from .rounding import RoundedNumber, round_function
 from .trace import TracedFunction
-from .tubes import TubeCell, TubedBranch, TubePart
 
 
 @dataclass(frozen=True, eq=False, repr=False)

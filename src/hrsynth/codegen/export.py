@@ -7,30 +7,30 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
+from ..analysis.analysis_declaration import analysis
 from ..analysis.branch.answer import BACK, BranchLimit, BranchProof
 from ..analysis.branch.proof import BoxLike, Cells, MotorBox, branch, parsed_box
 from ..analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, as_robot, as_texts
-from ..analysis.question import analysis
 from ..budgets import BRANCH_CELLS
 from ..errors import BadRequest, HrsynthError
 from ..geometry.vectors import Array
 from ..mechanism.observations.direction import Direction
 from ..options import option
-from ..progress import tell
+from ..progress import report
 from ..records import Recorded, Shown, Table, recorded
 from ..results import Result
 from ..tolerances import GENERATED_CLOSED, GENERATED_LAST_STEP
+from .branch_cells import TubedBranch
 from .inverse import closed_inverse
 from .languages import TEMPLATES, program
 from .source import ProvedBounds, Source
-from .tubes import TubedBranch
 
 
 class ExportedPart(NamedTuple):
     """Motors with the passive coordinates that they alone decide: how much of the box is proved, and a box that is."""
 
     motors: tuple[str, ...]
-    share: float
+    volume_fraction: float
     proved: Annotated[tuple[Array, Array], Table, "low and high of each motor (m, rad)"]
 
 
@@ -65,7 +65,7 @@ class ExportedCode(Result, shown_as="export"):
         return self.proof.robot
 
     @property
-    def setting(self) -> Any:
+    def setup(self) -> Any:
         """What is compared besides the record."""
         return self.proof.robot
 
@@ -75,8 +75,8 @@ class ExportedCode(Result, shown_as="export"):
 
     motors = Shown(list[str], lambda self: self.proof.motors)
     passive = Shown(list[str], lambda self: self.proof.passive)
-    held = Shown(list[str], lambda self: self.proof.held)
-    back = Shown(Table | None, lambda self: self.proof.back, BACK)
+    fixed = Shown(list[str], lambda self: self.proof.held)
+    injective_box = Shown(Table | None, lambda self: self.proof.injective_box, BACK)
     limits = Shown(list[BranchLimit], lambda self: self.proof.limits)
 
     @property
@@ -101,7 +101,7 @@ class ExportedCode(Result, shown_as="export"):
     @recorded()
     def parts(self) -> list[ExportedPart]:
         """The parts of the proof, without their cells."""
-        return [ExportedPart(each.motors, each.share, each.proved) for each in self.proof.parts]
+        return [ExportedPart(each.motors, each.volume_fraction, each.proved) for each in self.proof.parts]
 
 
 @analysis(
@@ -144,7 +144,7 @@ def export(
     proof = branch(given, box, effort=effort)
     if not proof.parts:
         raise BadRequest(f"{proof.robot.name}: loops that its motors move", 0, "one or more")
-    tell("code")
+    report("code")
     branch_ = TubedBranch.of(proof, parsed_box(box))
     moved = proof.robot not in (given, getattr(given, "robot", None))
     source = Source.of(branch_, watched, closed_inverse(proof.robot if moved else given, proof, branch_))
@@ -216,12 +216,12 @@ def _describe_program(
         if value
         for word in (f"--{name}", value)
     ]
-    held = [f"{name} = {zero:.6g}" if zero else name for name, zero in proof.held_at.items()]
+    held = [f"{name} = {zero:.6g}" if zero else name for name, zero in proof.fixed_at.items()]
     lines = [
         f"Made by hrsynth {__version__}: {shlex.join(words)}",
         *([f"SHA-256 of {file}: {robot.sha256}"] if robot.sha256 else []),
         f"Robot {robot.name}: {len(proof.motors)} motors, {len(proof.passive)} passive coordinates; idle, held"
-        f"{'' if any(proof.held_at.values()) else ' at 0'}: {', '.join(held) or 'none'}.",
+        f"{'' if any(proof.fixed_at.values()) else ' at 0'}: {', '.join(held) or 'none'}.",
         "Motors in order; values outside these ranges are refused:",
     ]
     rows = zip(proof.motors, branch_.lower.tolist(), branch_.upper.tolist(), branch_.motors, strict=True)
@@ -231,7 +231,7 @@ def _describe_program(
     for part in proof.parts:
         low, high = (each.tolist() for each in part.proved)
         lines.append(
-            f"{part.in_cells}, {100 * part.share:.4g} % of the box that was asked for; what no cell "
+            f"{part.in_cells}, {100 * part.volume_fraction:.4g} % of the box that was asked for; what no cell "
             "covers is refused. Fully covered:"
         )
         lines += [f"  {name}: {a!r} to {b!r}" for name, a, b in zip(part.motors, low, high, strict=True)]

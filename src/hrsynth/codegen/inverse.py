@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..analysis.branch.answer import BranchProof
+from ..analysis.branch.loop_parts import parts_of
 from ..analysis.branch.loops import TreeCoordinate
-from ..analysis.branch.part import parts_of
 from ..analysis.observed import ObservedRobot, RobotLike
 from ..batch.engine import Batch
 from ..batch.tape import Tape
@@ -25,8 +25,8 @@ from ..mechanism import JointType, Mechanism
 from ..mechanism.legs import Leg
 from ..results import Value
 from ..tolerances import SAME_GEOMETRY
+from .branch_cells import TubedBranch
 from .trace import TracedFunction
-from .tubes import TubedBranch
 
 SAMPLES = 64
 """Motors that closed forms must give back."""
@@ -109,7 +109,7 @@ def _itself(value: Any) -> Any:
 def closed_inverse(robot: RobotLike, proof: BranchProof, branch: TubedBranch) -> tuple[LegMotor, ...]:
     """A closed form for each motor, in the working mode of the zero configuration; none where a leg has none, or where
     the working mode is not proved to be the same in all cells (no Type 1 singularity in the box that they fill)."""
-    if not proof.regular or any(part.share > part.box_share for part in proof.parts):
+    if not proof.regular or any(part.volume_fraction > part.box_fraction for part in proof.parts):
         return ()
     try:
         observed = ObservedRobot.of(robot).by_segments("export")
@@ -161,7 +161,7 @@ def _forms(
         for each in mechanism.joints_of(crank):
             if mechanism.platform in each.links:
                 yield Pinned(motor, _of_platform(batch, mechanism, each.point), axis=coordinate.axis), "end"
-    for leg in observed.anatomy.legs:
+    for leg in observed.decomposition.legs:
         form = batch.legs[leg.label]
         if motor not in leg.joints or not isinstance(form, ClosedFormLeg):
             continue

@@ -111,7 +111,7 @@ def program(source: Source, language: str, told: Sequence[str]) -> str:
         "functions": functions,
         "lower": [float(x) for x in branch.lower],
         "upper": [float(x) for x in branch.upper],
-        "back": [[float(x) for x in end] for end in branch.back or ()],
+        "back": [[float(x) for x in end] for end in branch.injective_box or ()],
         "motor_names": source.names(branch.motors),
         "passive_names": [*source.names(branch.passive), *source.cut],
         "direction_names": [observation.leg for observation in source.observed],

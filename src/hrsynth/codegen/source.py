@@ -10,11 +10,11 @@ import numpy as np
 
 from ..mechanism.observations.direction import Direction
 from ..results import Value
+from .branch_cells import TubedBranch, TubePart
 from .cell_tree import Node, cell_tree, tree_depth
 from .convergence import BoundedCell, bounded_cells, platform_error
 from .inverse import LegMotor
 from .trace import FormulaTracer, TracedFunction
-from .tubes import TubedBranch, TubePart
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 
 from ..geometry.vectors import Array, hat
-from ..kinematics.locked import interaction
-from ..kinematics.relation import Measurement
+from ..kinematics.locked_twists import interaction
+from ..kinematics.velocity_relation import ObservationModel
 from ..results import Value
 from ..tolerances import SAME_RELATION
+from .closed_conditions import closed_form
 from .locked_legs import LockedLeg, forbidden, projectors, stopped_turns
-from .mixtures import closed_form
 from .named_vectors import BodyVector, NamedVector, Tangent
 from .pattern import TURNING_MOTIONS, ConstraintPattern, PatternValues
 from .vector_algebra import evaluate, products, vector
@@ -79,10 +79,10 @@ class Named(Condition):
 class General(Condition):
     """The condition of any mechanism: the interaction matrix by the screws of all joints loses rank."""
 
-    question: Measurement = field(kw_only=True)
+    observation_model: ObservationModel = field(kw_only=True)
 
     def rows(self, here: PatternValues) -> Array:
-        return np.array([interaction(at, self.question) for at in here.configurations])
+        return np.array([interaction(at, self.observation_model) for at in here.configurations])
 
 
 def rows(pattern: ConstraintPattern, values: Values) -> Array:
@@ -117,10 +117,10 @@ def plucker(pattern: ConstraintPattern, values: Values) -> Array:
     return np.stack([np.concatenate([n, np.cross(B, n)], axis=-1) for n, B in pairs], axis=1)
 
 
-def condition(pattern: ConstraintPattern, question: Measurement) -> Condition:
+def condition(pattern: ConstraintPattern, observation_model: ObservationModel) -> Condition:
     """The condition of a pattern: by name where it is a known one, else by the screws of all joints."""
     if pattern.motion in ("other", "oriented"):
-        return _general(question)
+        return _general(observation_model)
     if pattern.motion == "translations" and (fixed := [leg for leg in pattern.legs if leg.fixed]):
         what = "motion" if any(leg.turns == 0 for leg in fixed) else "translation"
         return Named(f"never: a held leg leaves the platform no {what}", _number(1), never=True, pattern=pattern)
@@ -315,11 +315,11 @@ def _name_condition(
     )
 
 
-def _general(question: Measurement) -> General:
+def _general(observation_model: ObservationModel) -> General:
     import sympy
 
     size = sympy.Symbol("d", integer=True, positive=True)
-    M = sympy.MatrixSymbol("M", sum(question.sizes), size)
+    M = sympy.MatrixSymbol("M", sum(observation_model.sizes), size)
     where = {
         "M": "rates of what is observed for a basis of the platform's motions: M = Y K (X K)^+",
         "K": "basis of the links' motions on which no wrench that a joint transmits does work",
@@ -327,7 +327,7 @@ def _general(question: Measurement) -> General:
         "Y": "rates of what is observed",
     }
     words = "the legs, with their measurements held, transmit no wrench against some motion of the platform"
-    return General(words, sympy.Determinant(M.T * M), where=where, question=question)
+    return General(words, sympy.Determinant(M.T * M), where=where, observation_model=observation_model)
 
 
 def always(pattern: ConstraintPattern, lost: str) -> str:

@@ -14,9 +14,9 @@ import numpy as np
 from ..geometry.ranks import range_basis
 from ..geometry.vectors import Array, frozen
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.relation import Measurement
+from ..kinematics.velocity_relation import ObservationModel
+from ..mechanism.cameras import CameraObservation
 from ..mechanism.observations.direction import SeenAxis
-from ..mechanism.sights import CameraObservation
 from ..results import Value
 from ..tolerances import SAME_RELATION
 from .named_vectors import BodyPoint, BodyVector, CrossProduct, NamedVector, Ray, TangentNormal, poses_at
@@ -100,7 +100,7 @@ def virtual_legs(
 ) -> tuple[LockedLeg, ...] | None:
     """The virtual legs of observations of a body of the platform, numbered from ``first``; None where one has wrenches
     that have no name, or that are not those of its rates everywhere."""
-    found, eyes = [], _eyes(seen, reference, samples[0].twin.length)
+    found, eyes = [], _eyes(seen, reference, samples[0].model.length)
     for number, each in enumerate(seen, first):
         leg = _virtual_leg(each, reference, bodies, str(number), eyes, samples)
         if leg is None:
@@ -109,14 +109,14 @@ def virtual_legs(
     return tuple(found)
 
 
-def sights(question: Measurement, base: str, bodies: Sequence[str]) -> tuple[Sight, ...]:
+def sights(observation_model: ObservationModel, base: str, bodies: Sequence[str]) -> tuple[Sight, ...]:
     """The observations between the base and a body of the platform, without the directions that legs have."""
     return tuple(
         o
-        for o in question.observations
+        for o in observation_model.observations
         if isinstance(o, CameraObservation | SeenAxis)
         and not o.by_segment
-        and (ends := {o.link, o.seen_from or question.reference}) & set(bodies)
+        and (ends := {o.link, o.seen_from or observation_model.reference}) & set(bodies)
         and base in ends
     )
 
@@ -153,7 +153,7 @@ def _virtual_leg(
 ) -> LockedLeg | None:
     """The leg whose tip and turns are those that the observation's wrenches leave, at all samples."""
     link, reference = seen.link, seen.seen_from or camera
-    body, length = link if link in bodies else reference, samples[0].twin.length
+    body, length = link if link in bodies else reference, samples[0].model.length
     if isinstance(seen, CameraObservation):
         if not seen.whole:
             return None

@@ -164,8 +164,8 @@ def centre_of(mechanism: Mechanism, joint: Joint, link: str, symbol: str, length
 def poses_at(configurations: Sequence[ClosedConfiguration], links: Sequence[str]) -> dict[str, Array]:
     """Poses (n, 4, 4) of links at several configurations, positions in characteristic lengths."""
     names = tuple(dict.fromkeys(links))
-    X = np.array([at.twin.poses(at.q, names) for at in configurations])
-    X[..., :3, 3] /= configurations[0].twin.length
+    X = np.array([at.model.poses(at.q, names) for at in configurations])
+    X[..., :3, 3] /= configurations[0].model.length
     return {name: X[:, i] for i, name in enumerate(names)}
 
 

@@ -17,16 +17,16 @@ from ..budgets import LEGS_HELD
 from ..geometry.ranks import range_basis
 from ..geometry.vectors import Array, cross, frozen, hat
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.locked import leg_twists_together, split_together
-from ..kinematics.relation import Measurement, relation
+from ..kinematics.locked_twists import leg_twists_together, split_together
+from ..kinematics.velocity_relation import ObservationModel, relation
 from ..mechanism import JointType, Mechanism, Observation
 from ..mechanism.legs import Leg, LegDecomposition
 from ..mechanism.observations.direction import Direction
 from ..results import Value
 from ..tolerances import SAME_RELATION
+from .locked_leg_rank import may_gain_motion
 from .locked_legs import LockedLeg, forbidden, sights, stopped_turns, virtual_legs
 from .named_vectors import BodyPoint, BodyVector, NamedVector, Segment, Tangent, axis_of, centre_of, poses_at, vanishes
-from .steady import grows
 
 TURNING_MOTIONS = ("planar", "spatial")
 """Motions of a platform of which turns are a part."""
@@ -113,66 +113,83 @@ class PatternValues(Value):
         return found
 
 
-def leg_ends(anatomy: LegDecomposition) -> tuple[str, ...]:
+def leg_ends(decomposition: LegDecomposition) -> tuple[str, ...]:
     """The links of the platform on which legs end."""
-    return tuple(dict.fromkeys(leg.attach for leg in anatomy.legs))
+    return tuple(dict.fromkeys(leg.platform_link for leg in decomposition.legs))
 
 
-def placing_links(anatomy: LegDecomposition) -> tuple[str, ...]:
+def placing_links(decomposition: LegDecomposition) -> tuple[str, ...]:
     """The links of the platform that tell where it is: those on which legs end, and the controlled one where these
     leave it several poses."""
-    return leg_ends(anatomy) if anatomy.decided else (*leg_ends(anatomy), anatomy.mechanism.platform)
+    return (
+        leg_ends(decomposition)
+        if decomposition.decided
+        else (*leg_ends(decomposition), decomposition.mechanism.platform)
+    )
 
 
 def recognise(
-    anatomy: LegDecomposition, question: Measurement, samples: Sequence[ClosedConfiguration], *, everywhere: bool = True
+    decomposition: LegDecomposition,
+    observation_model: ObservationModel,
+    samples: Sequence[ClosedConfiguration],
+    *,
+    everywhere: bool = True,
 ) -> ConstraintPattern:
     """The pattern at the samples; ``motion`` is ``other`` where it is none of the known ones, or, unless it need not
     hold ``everywhere``, where a held leg may leave its end more at special poses."""
-    other = ConstraintPattern("other", anatomy.mechanism.base, leg_ends(anatomy))
-    base, bodies = anatomy.mechanism.base, leg_ends(anatomy)
-    motions = _motions(anatomy, question, samples)
-    by_platform = sights(question, base, bodies)
-    locks: dict[str, list[Observation]] = {leg.label: [] for leg in anatomy.legs}
-    for each in question.observations:
+    other = ConstraintPattern("other", decomposition.mechanism.base, leg_ends(decomposition))
+    base, bodies = decomposition.mechanism.base, leg_ends(decomposition)
+    motions = _motions(decomposition, observation_model, samples)
+    by_platform = sights(observation_model, base, bodies)
+    locks: dict[str, list[Observation]] = {leg.label: [] for leg in decomposition.legs}
+    for each in observation_model.observations:
         if each not in by_platform:
-            leg = _leg_of(each, anatomy, question)
+            leg = _leg_of(each, decomposition, observation_model)
             if leg is None:
                 return other
             locks[leg].append(each)
     translating = len(bodies) == 1 and vanishes(motions[:, 3:])
     held = {
         leg.label: _locked_leg(
-            anatomy, leg, tuple(locks[leg.label]), question.reference, tuple(samples), everywhere, translating
+            decomposition,
+            leg,
+            tuple(locks[leg.label]),
+            observation_model.reference,
+            tuple(samples),
+            everywhere,
+            translating,
         )
-        for leg in anatomy.legs
+        for leg in decomposition.legs
     }
     alone = motions.shape[1:] == (6, 6) and not any(locks.values())
-    if anatomy.mechanism.couplings and not alone:
+    if decomposition.mechanism.couplings and not alone:
         return other
-    virtual = virtual_legs(by_platform, question.reference, bodies, 1 if alone else len(held) + 1, samples)
+    virtual = virtual_legs(by_platform, observation_model.reference, bodies, 1 if alone else len(held) + 1, samples)
     seen = [leg for label, leg in held.items() if locks[label]]
     if virtual is None or None in seen or not (seen or virtual):
         return other
     legs = (*(leg for leg in seen if leg is not None), *virtual)
     every = None if None in held.values() else (*(leg for leg in held.values() if leg is not None), *virtual)
     other = replace(other, legs=legs)
-    if anatomy.point is not None:
-        velocities = [relation(at, question.of_platform).twists for at in samples]
-        found: ConstraintPattern | None = _translations(anatomy, every, legs, velocities, samples)
+    if decomposition.point is not None:
+        velocities = [relation(at, observation_model.of_platform).twists for at in samples]
+        found: ConstraintPattern | None = _translations(decomposition, every, legs, velocities, samples)
     elif len(other.bodies) == 1:
-        found = _one_body(anatomy, every, legs, motions, samples)
+        found = _one_body(decomposition, every, legs, motions, samples)
     else:
-        found = _two_bodies(anatomy, legs, motions, samples)
+        found = _two_bodies(decomposition, legs, motions, samples)
     if (
         found is not None
         and found.plane is not None
         and found.motion == "planar"
         and not all(
             _turns_about(
-                found.plane, own, leg_twists_together(samples, leg, locks[leg.label], question.reference), samples
+                found.plane,
+                own,
+                leg_twists_together(samples, leg, locks[leg.label], observation_model.reference),
+                samples,
             )
-            for leg in anatomy.legs
+            for leg in decomposition.legs
             if locks[leg.label] and (own := held[leg.label]) is not None and own.turns < 3
         )
     ):
@@ -202,30 +219,33 @@ def _turns_about(
     return all(vanishes(t - T @ (T.T @ t)) for t, T in zip(turns, systems, strict=True))
 
 
-def _leg_of(seen: Observation, anatomy: LegDecomposition, question: Measurement) -> str | None:
+def _leg_of(seen: Observation, decomposition: LegDecomposition, observation_model: ObservationModel) -> str | None:
     """The label of the leg of which an observation is: that it bears, or of the one in which it lies."""
-    if seen.leg in anatomy.labels:
+    if seen.leg in decomposition.labels:
         return seen.leg
-    inside = {seen.link, seen.seen_from or question.reference} - {anatomy.mechanism.base, *leg_ends(anatomy)}
-    return next((leg.label for leg in anatomy.legs if inside and inside <= set(leg.links)), None)
+    inside = {seen.link, seen.seen_from or observation_model.reference} - {
+        decomposition.mechanism.base,
+        *leg_ends(decomposition),
+    }
+    return next((leg.label for leg in decomposition.legs if inside and inside <= set(leg.links)), None)
 
 
 def _one_body(
-    anatomy: LegDecomposition,
+    decomposition: LegDecomposition,
     every: tuple[LockedLeg, ...] | None,
     legs: tuple[LockedLeg, ...],
     motions: Array,
     samples: Sequence[ClosedConfiguration],
 ) -> ConstraintPattern | None:
     """The pattern of one body: of the ``legs`` that are watched, or of ``every`` leg, None where one has none."""
-    base, bodies = anatomy.mechanism.base, leg_ends(anatomy)
+    base, bodies = decomposition.mechanism.base, leg_ends(decomposition)
     own = [leg for leg in legs if not leg.virtual]
-    if len(own) < len(anatomy.legs) and motions.shape[2] < (2 if own else 3):  # the other legs hold as well
+    if len(own) < len(decomposition.legs) and motions.shape[2] < (2 if own else 3):  # the other legs hold as well
         return None
     if vanishes(motions[:, 3:]):
-        return _translations(anatomy, every, legs, list(motions[:, :3]), samples)
+        return _translations(decomposition, every, legs, list(motions[:, :3]), samples)
     if any(leg.turns == 0 and not leg.spins for leg in legs):
-        return None if every is None else replace(_translating(anatomy, every, samples), turning=True)
+        return None if every is None else replace(_translating(decomposition, every, samples), turning=True)
     if any(leg.turns < 3 and leg.spins for leg in legs):
         return None
     normal = _plane_of(motions)
@@ -233,9 +253,11 @@ def _one_body(
         flat = all(
             vanishes(leg.line.value(poses_at(samples, leg.line.links)) @ normal) for leg in legs if leg.line is not None
         )
-        return ConstraintPattern("planar", base, bodies, legs, plane=_normal(anatomy.mechanism, normal), flat=flat)
+        return ConstraintPattern(
+            "planar", base, bodies, legs, plane=_normal(decomposition.mechanism, normal), flat=flat
+        )
     if every is not None and all(leg.turns == 1 and leg.normal is None and not leg.virtual for leg in every):
-        plane = _common_plane(anatomy.mechanism, every, samples)
+        plane = _common_plane(decomposition.mechanism, every, samples)
         return None if plane is None else ConstraintPattern("planar", base, bodies, every, plane=plane)
     if motions.shape[2] == 6 and all(leg.turns == 3 or leg.virtual for leg in legs):
         return ConstraintPattern("spatial", base, bodies, legs)
@@ -246,7 +268,7 @@ def _one_body(
 
 
 def _translations(
-    anatomy: LegDecomposition,
+    decomposition: LegDecomposition,
     every: tuple[LockedLeg, ...] | None,
     legs: tuple[LockedLeg, ...],
     motions: Sequence[Array],
@@ -255,8 +277,8 @@ def _translations(
     """The pattern of translations, bases (3, d) of which are given: of the ``legs`` that are watched where these leave
     the tips none but such, else of ``every`` leg, since the others hold as well; None where one of them has none."""
     if len(motions) == len(samples) and all(_within(leg, motions, samples) for leg in legs):
-        return _translating(anatomy, legs, samples)
-    return None if every is None else _translating(anatomy, every, samples)
+        return _translating(decomposition, legs, samples)
+    return None if every is None else _translating(decomposition, every, samples)
 
 
 def _within(leg: LockedLeg, motions: Sequence[Array], samples: Sequence[ClosedConfiguration]) -> bool:
@@ -267,7 +289,7 @@ def _within(leg: LockedLeg, motions: Sequence[Array], samples: Sequence[ClosedCo
 
 
 def _translating(
-    anatomy: LegDecomposition, legs: tuple[LockedLeg, ...], samples: Sequence[ClosedConfiguration]
+    decomposition: LegDecomposition, legs: tuple[LockedLeg, ...], samples: Sequence[ClosedConfiguration]
 ) -> ConstraintPattern:
     lines = [leg.line for leg in legs if leg.line is not None]
     plane = None
@@ -275,8 +297,8 @@ def _translating(
         poses = poses_at(samples, [link for line in lines for link in line.links])
         _, s, Vt = np.linalg.svd(np.concatenate([line.value(poses) for line in lines]))
         if s[1] > SAME_RELATION * s[0] > s[2]:
-            plane = _normal(anatomy.mechanism, Vt[2], "direction normal to the lines along which the tips move")
-    found = ConstraintPattern("translations", anatomy.mechanism.base, leg_ends(anatomy), legs, plane=plane)
+            plane = _normal(decomposition.mechanism, Vt[2], "direction normal to the lines along which the tips move")
+    found = ConstraintPattern("translations", decomposition.mechanism.base, leg_ends(decomposition), legs, plane=plane)
     turns = {
         link: X[:, :3, :3]
         for link, X in poses_at(samples, [link for each in found.features for link in each.links]).items()
@@ -285,33 +307,35 @@ def _translating(
 
 
 def _two_bodies(
-    anatomy: LegDecomposition, legs: tuple[LockedLeg, ...], motions: Array, samples: Sequence[ClosedConfiguration]
+    decomposition: LegDecomposition, legs: tuple[LockedLeg, ...], motions: Array, samples: Sequence[ClosedConfiguration]
 ) -> ConstraintPattern | None:
     """Two bodies that only translate, the second along one direction relative to the first; with them the controlled
     link must be at rest, which it need not where it hangs on them by loops that have dead points."""
-    bodies = leg_ends(anatomy)
+    bodies = leg_ends(decomposition)
     still = motions[:, [3, 4, 5, 9, 10, 11]]
-    if not anatomy.decided or len(bodies) != 2 or motions.shape[2] != 4 or not vanishes(still):
+    if not decomposition.decided or len(bodies) != 2 or motions.shape[2] != 4 or not vanishes(still):
         return None
     relative = [range_basis(F[6:9] - F[:3], 1.0)[0] for F in motions]
     if any(each.shape[1] != 1 for each in relative):
         return None
     directions = np.array([each[:, 0] for each in relative])
-    inner = [j for j in anatomy.mechanism.joints.values() if set(j.links) <= set(anatomy.platform)]
+    inner = [j for j in decomposition.mechanism.joints.values() if set(j.links) <= set(decomposition.platform)]
     named = [
-        *(axis_of(anatomy.mechanism, j, "e") for j in inner if j.type is JointType.PRISMATIC),
-        *_tangents(anatomy, [j.name for j in inner], "e"),
+        *(axis_of(decomposition.mechanism, j, "e") for j in inner if j.type is JointType.PRISMATIC),
+        *_tangents(decomposition, [j.name for j in inner], "e"),
     ]
     slide = next((f for f in named if _along(f, directions, samples)), None)
     if slide is None:
         return None
-    return ConstraintPattern("bodies", anatomy.mechanism.base, leg_ends(anatomy), legs, slide=slide)
+    return ConstraintPattern("bodies", decomposition.mechanism.base, leg_ends(decomposition), legs, slide=slide)
 
 
-def _motions(anatomy: LegDecomposition, question: Measurement, samples: Sequence[ClosedConfiguration]) -> Array:
+def _motions(
+    decomposition: LegDecomposition, observation_model: ObservationModel, samples: Sequence[ClosedConfiguration]
+) -> Array:
     """Bases (n, 6 bodies, d) of what the platform's bodies can do with nothing held; they differ in number where the
     samples are not alike, then the largest are kept."""
-    asked = replace(question, bodies=leg_ends(anatomy), observations=())
+    asked = replace(observation_model, bodies=leg_ends(decomposition), observations=())
     found = [relation(at, asked).basis[asked.twist_rows :] for at in samples]
     bases = [range_basis(each, 1.0)[0] for each in found]
     most = max(basis.shape[1] for basis in bases)
@@ -319,11 +343,11 @@ def _motions(anatomy: LegDecomposition, question: Measurement, samples: Sequence
 
 
 def moving(
-    anatomy: LegDecomposition, question: Measurement, samples: Sequence[ClosedConfiguration]
+    decomposition: LegDecomposition, observation_model: ObservationModel, samples: Sequence[ClosedConfiguration]
 ) -> tuple[str, Array | None]:
     """How a platform of one body moves with nothing held: ``translations``, ``planar`` with the normal, or
     ``spatial``."""
-    motions = _motions(anatomy, question, samples)
+    motions = _motions(decomposition, observation_model, samples)
     if vanishes(motions[:, 3:]):
         return "translations", None
     normal = _plane_of(motions)
@@ -364,7 +388,7 @@ def _normal(mechanism: Mechanism, normal: Array, meaning: str = "normal of the p
 
 @lru_cache(maxsize=LEGS_HELD)
 def _locked_leg(
-    anatomy: LegDecomposition,
+    decomposition: LegDecomposition,
     leg: Leg,
     locks: tuple[Observation, ...],
     reference: str,
@@ -377,8 +401,8 @@ def _locked_leg(
         systems = leg_twists_together(samples, leg, locks, reference)
     except ValueError:
         return None
-    symbol = leg.label if leg.label.isalnum() else str(anatomy.labels.index(leg.label) + 1)
-    for spot in _tips(anatomy, leg, symbol, samples[0].twin.length):
+    symbol = leg.label if leg.label.isalnum() else str(decomposition.labels.index(leg.label) + 1)
+    for spot in _tips(decomposition, leg, symbol, samples[0].model.length):
         points = spot.value(poses_at(samples, spot.links))
         parts = split_together(systems, list(points))
         first = parts[0]
@@ -387,18 +411,20 @@ def _locked_leg(
             continue
         line = normal = None
         if shape[0] == 1:
-            line = _name_vector(anatomy, leg, locks, symbol, np.array([p.translations[:, 0] for p in parts]), samples)
+            line = _name_vector(
+                decomposition, leg, locks, symbol, np.array([p.translations[:, 0] for p in parts]), samples
+            )
         elif shape[0] == 2:
             across = np.array([cross(p.translations[:, 0], p.translations[:, 1]) for p in parts])
-            normal = _name_vector(anatomy, leg, locks, symbol, across, samples)
+            normal = _name_vector(decomposition, leg, locks, symbol, across, samples)
         if shape[0] in (1, 2) and line is None and normal is None:
             return None
-        more = grows(leg, locks, reference, points, samples, translating) if everywhere else ""
+        more = may_gain_motion(leg, locks, reference, points, samples, translating) if everywhere else ""
         if more == "tip":
             continue
         return LockedLeg(
             leg.label,
-            leg.attach,
+            leg.platform_link,
             spot,
             line,
             normal,
@@ -410,22 +436,22 @@ def _locked_leg(
     return None
 
 
-def _tips(anatomy: LegDecomposition, leg: Leg, symbol: str, length: float) -> Iterator[BodyPoint]:
+def _tips(decomposition: LegDecomposition, leg: Leg, symbol: str, length: float) -> Iterator[BodyPoint]:
     """Points at which the leg may come apart: its joints on the platform first, then the others, inwards."""
-    mechanism = anatomy.mechanism
+    mechanism = decomposition.mechanism
     joints = [mechanism.joints[name] for name in leg.joints]
-    if anatomy.point is not None:
-        yield BodyPoint(f"B{symbol}", "the platform's point", mechanism.platform, frozen(anatomy.point / length))
+    if decomposition.point is not None:
+        yield BodyPoint(f"B{symbol}", "the platform's point", mechanism.platform, frozen(decomposition.point / length))
     for joint in joints:
-        if leg.attach in joint.links:
-            yield centre_of(mechanism, joint, leg.attach, f"B{symbol}", length)
+        if leg.platform_link in joint.links:
+            yield centre_of(mechanism, joint, leg.platform_link, f"B{symbol}", length)
     for joint in reversed(joints):
-        if leg.attach not in joint.links:
+        if leg.platform_link not in joint.links:
             yield centre_of(mechanism, joint, joint.predecessor, f"A{symbol}", length)
 
 
 def _name_vector(
-    anatomy: LegDecomposition,
+    decomposition: LegDecomposition,
     leg: Leg,
     locks: Sequence[Observation],
     symbol: str,
@@ -433,7 +459,7 @@ def _name_vector(
     samples: Sequence[ClosedConfiguration],
 ) -> NamedVector | None:
     """The first vector with a name that is parallel to ``values`` (n, 3) at all samples."""
-    mechanism = anatomy.mechanism
+    mechanism = decomposition.mechanism
     candidates: list[NamedVector] = []
     for lock in locks:
         if isinstance(lock, Direction):
@@ -444,17 +470,17 @@ def _name_vector(
             )
     joints = [mechanism.joints[name] for name in leg.joints]
     candidates += [axis_of(mechanism, j, f"p{symbol}") for j in joints if j.type.slides]
-    candidates += _segments(anatomy, leg.joints, f"r{symbol}")
-    candidates += _tangents(anatomy, leg.joints, f"tau{symbol}")
+    candidates += _segments(decomposition, leg.joints, f"r{symbol}")
+    candidates += _tangents(decomposition, leg.joints, f"tau{symbol}")
     candidates += [
         axis_of(mechanism, j, f"a{symbol}", which) for j in joints if not j.type.slides for which in range(len(j.axes))
     ]
     return next((f for f in candidates if _along(f, values, samples)), None)
 
 
-def _tangents(anatomy: LegDecomposition, names: Sequence[str], symbol: str) -> Iterator[Tangent]:
+def _tangents(decomposition: LegDecomposition, names: Sequence[str], symbol: str) -> Iterator[Tangent]:
     """Tangents of the paths of joint centres about R axes, for some joints; those on one link first."""
-    mechanism, length = anatomy.mechanism, anatomy.mechanism.length
+    mechanism, length = decomposition.mechanism, decomposition.mechanism.length
     joints = [mechanism.joints[name] for name in names]
     pairs = [
         (axis, which, end)
@@ -476,9 +502,9 @@ def _tangents(anatomy: LegDecomposition, names: Sequence[str], symbol: str) -> I
         )
 
 
-def _segments(anatomy: LegDecomposition, names: Sequence[str], symbol: str) -> Iterator[Segment]:
+def _segments(decomposition: LegDecomposition, names: Sequence[str], symbol: str) -> Iterator[Segment]:
     """Directions from joint centre to joint centre of the links of a leg."""
-    mechanism, length = anatomy.mechanism, anatomy.mechanism.length
+    mechanism, length = decomposition.mechanism, decomposition.mechanism.length
     joints = [mechanism.joints[name] for name in names]
     for one, two in combinations(joints, 2):
         for link in sorted(set(one.links) & set(two.links) - {mechanism.base}):

@@ -16,10 +16,10 @@ from typing import IO, TYPE_CHECKING, Any
 
 from ..budgets import LARGEST_FILE
 from ..errors import (
+    AssumedBase,
+    AssumedPlatform,
     BadRequest,
     BadRobotFile,
-    GuessedBase,
-    GuessedPlatform,
     HrsynthError,
     shorten_text,
     warn_caller,
@@ -27,11 +27,11 @@ from ..errors import (
 from ..mechanism.model import Mechanism, Note
 from ..results import with_spelling
 from . import formats
-from .dialect import Dialect
-from .example_data import PREFIX, examples
+from .example_data import PREFIX, list_examples
+from .file_format import FileFormat
 from .files import as_path, require_same, require_writable, write_whole
 from .formats import native
-from .meshes import carry_meshes, taken_back, write_meshes
+from .meshes import carry_meshes, remove_written, write_meshes
 from .overrides import Overrides
 from .reading import read
 from .tree import spanning
@@ -39,7 +39,7 @@ from .tree import spanning
 if TYPE_CHECKING:
     from yourdfpy import URDF
 
-__all__ = ["examples", "load", "native", "save", "shipped", "spanning", "targets"]
+__all__ = ["list_examples", "list_robots", "load", "native", "save", "spanning", "targets"]
 
 NAMED = "a path, the name of a shipped robot, example:NAME"
 """How a robot's file is given."""
@@ -53,10 +53,10 @@ GIVEN, NOWHERE = "the given text", "(nowhere, as no file is given)"
 """What errors call text, and the folder of the files that it names."""
 
 
-def shipped() -> dict[str, Path]:
+def list_robots() -> dict[str, Path]:
     """The robots that come with the package: name to file, sorted by name.
 
-    >>> "3rrr_m1" in hrsynth.shipped()
+    >>> "3rrr_m1" in hrsynth.list_robots()
     True
     """
     packaged = Path(str(resources.files("hrsynth").joinpath("robots")))
@@ -84,7 +84,7 @@ def load(
     the dialect, while files that text names relatively lie nowhere; of a ``yourdfpy.URDF``, read as the file that it
     writes (a tree, whose closures are given); a mechanism is returned unchanged.
 
-    Where base or platform are guessed, ``GuessedBase`` and ``GuessedPlatform`` (kinds of ``UserWarning`` in
+    Where base or platform are guessed, ``AssumedBase`` and ``AssumedPlatform`` (kinds of ``UserWarning`` in
     ``hrsynth.errors``) are warned of. Where several links could be the platform, it stays open, and is asked for by the
     first question that needs it.
 
@@ -139,10 +139,10 @@ def load(
         found = _read_content(robot, overrides)
     for note in found.notes:
         if note.base:
-            warn_caller(shorten_text(f"{found.name}: {note.text}", MOST_WARNED), GuessedBase)
+            warn_caller(shorten_text(f"{found.name}: {note.text}", MOST_WARNED), AssumedBase)
     if found.choice is not None and found.choice.chosen == "guess":
         text = f"{found.name}: the platform is link {found.platform!r}, {found.choice}"
-        warn_caller(shorten_text(f"{text} (platform={found.platform!r} to say so)", MOST_WARNED), GuessedPlatform)
+        warn_caller(shorten_text(f"{text} (platform={found.platform!r} to say so)", MOST_WARNED), AssumedPlatform)
     return found
 
 
@@ -211,10 +211,10 @@ def file_of(robot: str | os.PathLike[str]) -> Path:
     path = Path(robot)
     if isinstance(robot, str) and robot.startswith(PREFIX) and not os.path.exists(robot):
         return _file_by_name(
-            robot.removeprefix(PREFIX), examples(), "not a robot of example-robot-data", "robots --examples"
+            robot.removeprefix(PREFIX), list_examples(), "not a robot of example-robot-data", "robots --examples"
         )
     if isinstance(robot, str) and not path.suffix and len(path.parts) == 1:
-        robots = shipped()
+        robots = list_robots()
         with contextlib.suppress(OSError, ValueError):
             if path.is_file():
                 return path
@@ -281,7 +281,7 @@ def save(
         for file, content in contents.items():
             write_whole(file, content)
     except BaseException:
-        taken_back(new)
+        remove_written(new)
         raise
     return (*found.lost, *notes)
 
@@ -299,7 +299,7 @@ def _require_whole(file: Path, others: Iterable[Path]) -> None:
             )
 
 
-def _dialect(target: Path, name: str | None) -> Dialect:
+def _dialect(target: Path, name: str | None) -> FileFormat:
     dialects = formats.writable()
     endings = {ending: each.name for each in dialects for ending in each.endings}
     if name is None and target.suffix.lower() not in endings:

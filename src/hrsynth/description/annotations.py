@@ -10,14 +10,14 @@ import numpy as np
 
 from ..errors import BadRequest
 from ..geometry.vectors import frozen, inverse
+from ..mechanism.cameras import NamedCamera
 from ..mechanism.model import JointType, Mechanism, Motor
 from ..mechanism.observations.direction import Direction
-from ..mechanism.sights import NamedCamera
 from ..tolerances import WITHOUT_DIRECTION
 from . import numerals
 from .elements import TURNS
 from .jointgraph import FrameSpec, JointGraph
-from .sights import attributes_of, spec_of
+from .observation_text import attributes_of, spec_of
 
 NAMESPACE = "urn:hrsynth"
 PREFIX = "hrsynth"

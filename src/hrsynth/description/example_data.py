@@ -10,10 +10,10 @@ PACKAGE = "example-robot-data"
 FOLDER = f"cmeel.prefix/share/{PACKAGE}/robots"
 
 
-def examples() -> dict[str, Path]:
+def list_examples() -> dict[str, Path]:
     """Name to file, sorted by name: the file's, with the folder's before it where several files have one name.
 
-    >>> robots = hrsynth.examples()
+    >>> robots = hrsynth.list_examples()
     """
     from importlib.metadata import distribution
 

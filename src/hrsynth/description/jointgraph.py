@@ -11,12 +11,12 @@ import numpy as np
 
 from ..geometry.vectors import Array, frozen, hat, inverse, plane_axes, unit
 from ..mechanism import graphs
+from ..mechanism.cameras import NamedCamera
 from ..mechanism.model import JointType, Limits, Link, Motor, Note, fresh_name
 from ..mechanism.observations.direction import Direction
 from ..mechanism.screws import elementary
-from ..mechanism.sights import NamedCamera
 from .numerals import Digits
-from .sights import SightSpec
+from .observation_text import ObservationSpec
 
 ORIGIN = frozen(np.eye(4))
 Z = frozen([0.0, 0.0, 1.0])
@@ -100,7 +100,7 @@ class JointSpec:
 
 
 @dataclass(frozen=True)
-class GearSpec:
+class CouplingSpec:
     """A coupling as a file gives it: coordinate of joint ``driven`` = ratio × that of ``driver`` + offset."""
 
     name: str
@@ -136,7 +136,7 @@ class JointGraph:
     dialect: str
     links: dict[str, Link] = field(default_factory=dict)
     joints: dict[str, JointSpec] = field(default_factory=dict)
-    gears: list[GearSpec] = field(default_factory=list)
+    gears: list[CouplingSpec] = field(default_factory=list)
     base: str | None = None
     platform: str | None = None
     formation: bool = False
@@ -145,7 +145,7 @@ class JointGraph:
     """Whether the platform's turn counts; None: by the joints."""
     camera: str | None = None
     observations: list[Direction] = field(default_factory=list)
-    sights: list[SightSpec] = field(default_factory=list)
+    sights: list[ObservationSpec] = field(default_factory=list)
     """Observations of other kinds, or by cameras that have a name."""
     cameras: list[NamedCamera] = field(default_factory=list)
     rest: list[str] = field(default_factory=list)
@@ -195,7 +195,7 @@ class JointGraph:
         """Add a joint that closes a loop; of ``axes`` it takes as many as its type has."""
         self.joints[name] = JointSpec(name, kind, ends, tuple(axes[: kind.axes]), None, (), line, motor, in_tree=False)
 
-    def follow(self, gears: Iterable[GearSpec]) -> None:
+    def follow(self, gears: Iterable[CouplingSpec]) -> None:
         """Add what mimics say, once all joints are known: a joint of one freedom follows another."""
         for gear in gears:
             ends = [self.joints.get(name) for name in (gear.driver, gear.driven)]

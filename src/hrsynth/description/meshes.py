@@ -254,14 +254,14 @@ def write_meshes(files: dict[Path, Callable[[], bytes]]) -> list[Path]:
                 new.append(path)
                 write_whole(path, data)
     except (OSError, HrsynthError) as error:
-        taken_back(new)
+        remove_written(new)
         if isinstance(error, HrsynthError):
             raise
         raise BadRequest(f"a mesh is not copied: {error.strerror}", str(error.filename)) from None
     return new
 
 
-def taken_back(new: list[Path]) -> None:
+def remove_written(new: list[Path]) -> None:
     """Remove what :func:`write_meshes` wrote."""
     for path in new:
         path.unlink(missing_ok=True)

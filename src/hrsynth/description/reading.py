@@ -13,7 +13,7 @@ from ..errors import LoopsNotClosed
 from ..mechanism.model import Mechanism, Note
 from ..mechanism.part import between
 from . import formats, xml
-from .dialect import RobotFile
+from .file_format import RobotFile
 from .formats.urdf import xacro
 from .jointgraph import JointGraph
 from .jointmotion import cure

@@ -17,7 +17,7 @@ from ..errors import Defect
 from ..mechanism.model import Note
 from ..tolerances import LIKE_A_WORD
 from . import xml
-from .dialect import RobotFile
+from .file_format import RobotFile
 
 ANY = "..."
 """In a table: an element may hold names that the format does not have, of which nothing is said."""

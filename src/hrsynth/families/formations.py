@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 from ..errors import BadRequest
 from ..geometry.vectors import Array, frozen
 from ..mechanism.builder import Builder
+from ..mechanism.cameras import NamedCamera
 from ..mechanism.model import Mechanism
 from ..mechanism.observation import Observation
 from ..mechanism.observations.distance import PointDistance
 from ..mechanism.observations.point import ImagePoint
-from ..mechanism.sights import NamedCamera
 
 MOVES = {"free": "6", "yaw": "xyzR", "position": "xyz", "plane": "xyR", "plane position": "xy"}
 """The joints that carry a body from the ground, by what it can do: slides along the axes of the common frame, a turn

@@ -14,19 +14,19 @@ from itertools import product
 import numpy as np
 
 from ..budgets import LEG_ITERATIONS
-from ..description.assembly.zero import zeroed_at
+from ..description.assembly.zero_configuration import zeroed_at
 from ..errors import LoopsNotClosed
 from ..geometry.vectors import Array, inverse
 from ..mechanism import Joint, JointType, Mechanism, Observation
 from ..mechanism.legs import Leg, LegDecomposition
 from ..tolerances import CLOSED, SOLVED
 from . import limits
-from .closures import UNDECIDED, Closures, LegEnd, Miss, leg_closures
 from .configuration import ClosedConfiguration
+from .leg_paths import MotionFactor, ways
 from .leg_reach import alone
+from .leg_solutions import UNDECIDED, LegEnd, LegSolutions, ReachFailure, leg_closures
 from .pinocchio_model import PinocchioModel
-from .tasks import LinkPoses, Target, solve
-from .ways import Part, ways
+from .tasks import LinkPoses, PoseAndValuesTask, solve
 
 STARTS = 24
 """Configurations of a leg, the zero configuration first, from which it is closed at a pose: for each of its listed
@@ -48,7 +48,7 @@ class Assembly:
     open: tuple[str, ...] = ()
     beyond: tuple[str, ...] = ()
     platform: Mapping[str, Array] | None = None
-    misses: tuple[tuple[str, Miss], ...] = ()
+    misses: tuple[tuple[str, ReachFailure], ...] = ()
     held: bool = False
     gears: tuple[str, ...] = ()
 
@@ -73,23 +73,25 @@ class Assembly:
 class Assembler:
     """A robot whose legs are closed one at a time between the base and bodies of the platform at given poses."""
 
-    anatomy: LegDecomposition
+    decomposition: LegDecomposition
     length: float
     reference: str
 
     @cached_property
     def _twins(self) -> dict[str, PinocchioModel]:
-        return {leg.label: PinocchioModel(alone(self.anatomy, leg), self.length) for leg in self.anatomy.legs}
+        return {
+            leg.label: PinocchioModel(alone(self.decomposition, leg), self.length) for leg in self.decomposition.legs
+        }
 
     @cached_property
     def _platform(self) -> Mechanism:
         """The platform alone, floating with the first body on which a leg ends."""
-        mechanism, body = self.anatomy.mechanism, self.anatomy.legs[0].attach
-        kept = {mechanism.base, *self.anatomy.platform}
+        mechanism, body = self.decomposition.mechanism, self.decomposition.legs[0].platform_link
+        kept = {mechanism.base, *self.decomposition.platform}
         floats = Joint(
             mechanism.fresh("floating"), JointType.FREE, mechanism.base, body, mechanism.links[body].pose[:3, 3]
         )
-        inside = set(self.anatomy.platform)
+        inside = set(self.decomposition.platform)
         outside = [name for name, joint in mechanism.joints.items() if not set(joint.links) <= inside]
         return mechanism.changed(
             remove_links=set(mechanism.links) - kept,
@@ -109,26 +111,26 @@ class Assembler:
     ) -> tuple[dict[str, Array], list[str], bool]:
         """The same with its joints that are beyond their limits there, and whether one is that has no other
         value where the bodies are, which is known to ``within``."""
-        mechanism, body = self._platform, self.anatomy.legs[0].attach
+        mechanism, body = self._platform, self.decomposition.legs[0].platform_link
         displacement = bodies[body] @ inverse(mechanism.links[body].pose)
-        poses = {link: displacement @ mechanism.links[link].pose for link in self.anatomy.platform}
+        poses = {link: displacement @ mechanism.links[link].pose for link in self.decomposition.platform}
         base = mechanism.links[mechanism.base].pose
-        twin = PinocchioModel(zeroed_at(mechanism, {mechanism.base: base, **poses}), self.length)
+        model = PinocchioModel(zeroed_at(mechanism, {mechanism.base: base, **poses}), self.length)
         target = LinkPoses(tuple(bodies.items()))
         residual = np.inf
-        for start in _starts(twin):
-            q, residual = solve(twin, start, target, tolerance=SOLVED, iterations=60)
-            if residual <= CLOSED and all(_turned_as(twin.pose(q, body), X) for body, X in bodies.items()):
+        for start in _starts(model):
+            q, residual = solve(model, start, target, tolerance=SOLVED, iterations=60)
+            if residual <= CLOSED and all(_turned_as(model.pose(q, body), X) for body, X in bodies.items()):
                 return (
-                    {link: twin.pose(q, link) for link in self.anatomy.platform},
-                    limits.outside(twin, q),
-                    self.anatomy.point is None and limits.surely_outside(twin, q, bodies, within),
+                    {link: model.pose(q, link) for link in self.decomposition.platform},
+                    limits.outside(model, q),
+                    self.decomposition.point is None and limits.is_proved_outside(model, q, bodies, within),
                 )
-        raise LoopsNotClosed(twin.mechanism.name, residual, CLOSED, "inside the platform")
+        raise LoopsNotClosed(model.mechanism.name, residual, CLOSED, "inside the platform")
 
     @cached_property
-    def _ways(self) -> dict[str, list[tuple[Part, ...]]]:
-        return {leg.label: list(ways(self.anatomy, leg)) for leg in self.anatomy.legs}
+    def _ways(self) -> dict[str, list[tuple[MotionFactor, ...]]]:
+        return {leg.label: list(ways(self.decomposition, leg)) for leg in self.decomposition.legs}
 
     def at(
         self, bodies: Mapping[str, Array], measured: Sequence[tuple[Observation, Array]], within: float = 0.0
@@ -137,21 +139,21 @@ class Assembler:
         lengths, radians), and the measured values as given."""
         platform, beyond, held = self._platform_at(bodies, within)
         poses = dict(platform)
-        missing, misses = list[str](), list[tuple[str, Miss]]()
-        for leg in self.anatomy.legs:
+        missing, misses = list[str](), list[tuple[str, ReachFailure]]()
+        for leg in self.decomposition.legs:
             own = [each for each in measured if each[0].leg == leg.label]
-            closing = self._leg(leg, bodies[leg.attach], own, within)
+            closing = self._leg(leg, bodies[leg.platform_link], own, within)
             if closing.found is None:
                 missing.append(leg.label)
                 misses += [] if closing.miss is None else [(leg.label, closing.miss)]
                 continue
-            twin, q = closing.found
-            poses.update({link: twin.pose(q, link) for link in leg.links if link not in poses})
-            beyond += limits.outside(twin, q, leg.joints)
+            model, q = closing.found
+            poses.update({link: model.pose(q, link) for link in leg.links if link not in poses})
+            beyond += limits.outside(model, q, leg.joints)
             held |= closing.held
         if missing:
             return Assembly(None, tuple(missing), (), platform, tuple(misses))
-        mechanism = self.anatomy.mechanism
+        mechanism = self.decomposition.mechanism
         poses[mechanism.base] = mechanism.links[mechanism.base].pose
         while len(poses) < len(mechanism.links):  # what hangs on no leg, as fingers do, is carried along
             carrier, link = next(
@@ -166,41 +168,41 @@ class Assembler:
 
     def _leg(self, leg: Leg, X: Array, measured: Sequence[tuple[Observation, Array]], within: float) -> _Closing:
         """One leg with its end at X: within its joints' limits where it was found there."""
-        twin = self._twins[leg.label]
-        target = Target(leg.attach, X, self.anatomy.point, self.reference, tuple(measured))
-        first = self._close(twin, twin.q0, target)
-        if first is not None and not limits.outside(twin, first, leg.joints):
-            return _Closing((twin, first))
-        zero = self.anatomy.mechanism.links[leg.attach].pose
+        model = self._twins[leg.label]
+        target = PoseAndValuesTask(leg.platform_link, X, self.decomposition.point, self.reference, tuple(measured))
+        first = self._close(model, model.q0, target)
+        if first is not None and not limits.outside(model, first, leg.joints):
+            return _Closing((model, first))
+        zero = self.decomposition.mechanism.links[leg.platform_link].pose
         end = LegEnd(X @ inverse(zero), self.length, within, target.point is None)
         known = leg_closures(self._ways[leg.label], end)
         if known.miss is not None:
             return _Closing(None, known.miss)
-        held = any(limits.all_excluded(twin.mechanism, joint, values) for joint, values in known.values) or any(
-            limits.never(way, dict(known.values), end.D, within, len(self._ways[leg.label]) == 1)
+        held = any(limits.all_excluded(model.mechanism, joint, values) for joint, values in known.values) or any(
+            limits.is_tilt_excluded(way, dict(known.values), end.D, within, len(self._ways[leg.label]) == 1)
             for way in self._ways[leg.label]
         )
-        for start in () if held and first is not None else _starts(twin, known):
-            q = self._close(twin, start, target)
-            if q is not None and (held or not limits.outside(twin, q, leg.joints)):
-                return _Closing((twin, q), None, held)
+        for start in () if held and first is not None else _starts(model, known):
+            q = self._close(model, start, target)
+            if q is not None and (held or not limits.outside(model, q, leg.joints)):
+                return _Closing((model, q), None, held)
             first = q if first is None else first
-        return _Closing(None if first is None else (twin, first), None, held)
+        return _Closing(None if first is None else (model, first), None, held)
 
-    def _close(self, twin: PinocchioModel, start: Array, target: Target) -> Array | None:
+    def _close(self, model: PinocchioModel, start: Array, target: PoseAndValuesTask) -> Array | None:
         """The closed configuration that a start leads to."""
-        q, residual = solve(twin, start, target, tolerance=SOLVED, iterations=LEG_ITERATIONS)
-        turned = target.point is not None or _turned_as(twin.pose(q, target.link), target.pose)
+        q, residual = solve(model, start, target, tolerance=SOLVED, iterations=LEG_ITERATIONS)
+        turned = target.point is not None or _turned_as(model.pose(q, target.link), target.pose)
         return q if residual <= CLOSED and turned else None
 
 
-def of_links(twin: PinocchioModel, pose: Callable[[str], Array]) -> ClosedConfiguration:
+def of_links(model: PinocchioModel, pose: Callable[[str], Array]) -> ClosedConfiguration:
     """The configuration of a twin at which its links have their poses (4, 4); raises ``LoopsNotClosed``."""
-    poses = {link: pose(link) for link in twin.mechanism.links}
-    q, residual = solve(twin, twin.read(poses.__getitem__), tolerance=SOLVED)
-    if residual > CLOSED or not all(_turned_as(twin.pose(q, link), X) for link, X in poses.items()):
-        raise LoopsNotClosed(twin.mechanism.name, residual, CLOSED, "in coordinates of the zero configuration")
-    return ClosedConfiguration.of(twin, q)
+    poses = {link: pose(link) for link in model.mechanism.links}
+    q, residual = solve(model, model.read(poses.__getitem__), tolerance=SOLVED)
+    if residual > CLOSED or not all(_turned_as(model.pose(q, link), X) for link, X in poses.items()):
+        raise LoopsNotClosed(model.mechanism.name, residual, CLOSED, "in coordinates of the zero configuration")
+    return ClosedConfiguration.of(model, q)
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,7 +211,7 @@ class _Closing:
     its closures are beyond limits."""
 
     found: tuple[PinocchioModel, Array] | None
-    miss: Miss | None = None
+    miss: ReachFailure | None = None
     held: bool = False
 
 
@@ -218,24 +220,24 @@ def _turned_as(X: Array, wanted: Array) -> bool:
     return float(np.trace(X[:3, :3].T @ wanted[:3, :3])) > 1.0
 
 
-def _starts(twin: PinocchioModel, known: Closures = UNDECIDED) -> Iterator[Array]:
+def _starts(model: PinocchioModel, known: LegSolutions = UNDECIDED) -> Iterator[Array]:
     """Configurations with the joints' values that are known, other joints as at zero, then at random, always the same;
     last without values."""
     rng = np.random.default_rng(0)
-    joints = [twin.coordinates[joint] for joint, _ in known.values if joint in twin.coordinates]
+    joints = [model.coordinates[joint] for joint, _ in known.values if joint in model.coordinates]
     lists = [
         [
-            float(value.mid()) / (twin.length if twin.mechanism.joints[joint].type.slides else 1.0)
+            float(value.mid()) / (model.length if model.mechanism.joints[joint].type.slides else 1.0)
             for value in values
             if value.is_finite()
         ]
         for joint, values in known.values
-        if joint in twin.coordinates
+        if joint in model.coordinates
     ]
     for combination in (*product(*lists), None):
         for number in range(STARTS):
-            step = rng.uniform(-np.pi, np.pi, twin.nv) if number else np.zeros(twin.nv)
+            step = rng.uniform(-np.pi, np.pi, model.nv) if number else np.zeros(model.nv)
             if combination is not None:
                 for (place,), value in zip(joints, combination, strict=True):
                     step[place] = value
-            yield twin.integrate(twin.q0, step)
+            yield model.integrate(model.q0, step)

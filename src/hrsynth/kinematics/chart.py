@@ -17,8 +17,8 @@ from ..geometry.vectors import Array
 from ..tolerances import CLOSED, SOLVED
 from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
-from .relation import Measurement
 from .tasks import solve
+from .velocity_relation import ObservationModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,10 +28,10 @@ class _Coordinates:
     chart: TangentChart
     y: Array
 
-    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
+    def error_and_jacobian(self, model: PinocchioModel, q: Array) -> tuple[Array, Array]:
         """Error (reached − wanted) and its Jacobian."""
         basis = self.chart.basis
-        return basis.T @ twin.difference(self.chart.centre.q, q) - self.y, self.chart.slope(q)
+        return basis.T @ model.difference(self.chart.centre.q, q) - self.y, self.chart.slope(q)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,24 +42,24 @@ class TangentChart:
     basis: Array
 
     @classmethod
-    def around(cls, centre: ClosedConfiguration, question: Measurement) -> TangentChart:
+    def around(cls, centre: ClosedConfiguration, observation_model: ObservationModel) -> TangentChart:
         """The chart whose directions are those that move the platform or anything that is observed."""
         kernel, _ = centre.kernel()
-        image = question.rows(centre) @ kernel
+        image = observation_model.rows(centre) @ kernel
         return cls(centre, kernel @ range_basis(image.T, 1.0)[0])
 
     def at(self, y: Array, near: Array, *, iterations: int = 15) -> ClosedConfiguration:
         """The configuration with the coordinates y that lies next to the configuration ``near`` (nq,); raises
         ``LoopsNotClosed``."""
-        twin = self.centre.twin
-        q, residual = solve(twin, near, _Coordinates(self, y), tolerance=SOLVED, iterations=iterations)
+        model = self.centre.model
+        q, residual = solve(model, near, _Coordinates(self, y), tolerance=SOLVED, iterations=iterations)
         if not residual <= CLOSED:
-            raise LoopsNotClosed(twin.mechanism.name, residual, CLOSED, twin.worst_loop(q)[0])
-        return ClosedConfiguration.of(twin, q)
+            raise LoopsNotClosed(model.mechanism.name, residual, CLOSED, model.worst_loop(q)[0])
+        return ClosedConfiguration.of(model, q)
 
     def slope(self, q: Array) -> Array:
         """The map from joint velocities at q to ẏ, (n, nv)."""
-        model = self.centre.twin.model
+        model = self.centre.model.model
         if model.nq == model.nv:
             return self.basis.T
         return np.asarray(self.basis.T @ pin.dDifference(model, self.centre.q, q, pin.ARG1))

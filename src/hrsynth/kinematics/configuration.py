@@ -26,41 +26,41 @@ from .pinocchio_model import PinocchioModel
 class ClosedConfiguration(Value):
     """A configuration of a twin whose loops are closed to ``tolerances.CLOSED``; ``q`` is read-only."""
 
-    twin: PinocchioModel
+    model: PinocchioModel
     q: Array
     residual: float
 
     @classmethod
-    def of(cls, twin: PinocchioModel, q: Array, tolerance: float = CLOSED) -> ClosedConfiguration:
+    def of(cls, model: PinocchioModel, q: Array, tolerance: float = CLOSED) -> ClosedConfiguration:
         """``q`` itself, if it is closed; raises ``LoopsNotClosed`` with the loop that misses most."""
         q = frozen(q)
-        residual = float(np.linalg.norm(twin.residual(q)))
+        residual = float(np.linalg.norm(model.residual(q)))
         if not residual <= tolerance:
-            raise LoopsNotClosed(twin.mechanism.name, residual, tolerance, twin.worst_loop(q)[0])
-        return cls(twin, q, residual)
+            raise LoopsNotClosed(model.mechanism.name, residual, tolerance, model.worst_loop(q)[0])
+        return cls(model, q, residual)
 
     @classmethod
     def several(
-        cls, twin: PinocchioModel, places: Sequence[Array], tolerance: float = CLOSED
+        cls, model: PinocchioModel, places: Sequence[Array], tolerance: float = CLOSED
     ) -> list[ClosedConfiguration]:
         """:meth:`of` of several, their constraints taken apart together."""
-        found = [cls.of(twin, q, tolerance) for q in places]
-        for at, loops in zip(found, spectra([twin.jacobian(at.q) for at in found], LOOPS_SCALE), strict=True):
+        found = [cls.of(model, q, tolerance) for q in places]
+        for at, loops in zip(found, spectra([model.jacobian(at.q) for at in found], LOOPS_SCALE), strict=True):
             at.__dict__["loops"] = loops
         return found
 
     def pose(self, link: str) -> Array:
         """X_BL (4, 4), metres."""
-        return self.twin.pose(self.q, link)
+        return self.model.pose(self.q, link)
 
     def velocity(self, link: str) -> Array:
         """V (6, nv) of a link's frame, see :meth:`PinocchioModel.velocity`."""
-        return self.twin.velocity(self.q, link)
+        return self.model.velocity(self.q, link)
 
     @cached_property
     def loops(self) -> Spectrum:
         """The constraints' Jacobian taken apart."""
-        return spectrum(self.twin.jacobian(self.q), LOOPS_SCALE)
+        return spectrum(self.model.jacobian(self.q), LOOPS_SCALE)
 
     def kernel(self) -> tuple[Array, Rank]:
         """A basis of T_qC, shape (nv, mobility), and the constraints' rank."""
@@ -73,42 +73,42 @@ class ClosedConfiguration(Value):
 
 
 def measure(
-    twin: PinocchioModel, q: Array, reference: str, observations: Sequence[Observation], links: Sequence[str] = ()
+    model: PinocchioModel, q: Array, reference: str, observations: Sequence[Observation], links: Sequence[str] = ()
 ) -> tuple[Array, Array, list[Array], list[Array]]:
     """Poses (k, 4, 4) and velocities (k, 6, nv) of ``links``; the value (size,) and the rates (size, nv) of each
     observation, seen from ``reference`` where it names no link of its own, lengths in characteristic lengths. All are
     read-only: what is asked again at the same place, as where one target is reached and the next begins, is kept."""
     asked = reference, tuple(observations), tuple(links)
-    last = twin.measured
+    last = model.measured
     if last is not None and last[1] is q and last[0] == asked:
         return last[2]
     names, whole, groups = _group_links(*asked)
-    X, V = twin.frames(q, names, whole)
+    X, V = model.frames(q, names, whole)
     metric = V
     if not all(group.kind.turns_only for group in groups):
         metric = V.copy()
-        metric[:, :3] *= twin.length
+        metric[:, :3] *= model.length
     X.setflags(write=False)
     V.setflags(write=False)
     values: list[Array] = [np.zeros(0)] * len(observations)
-    rates: list[Array] = [np.zeros((0, twin.nv))] * len(observations)
+    rates: list[Array] = [np.zeros((0, model.nv))] * len(observations)
     for group in groups:
         kind, view, at = group.kind, group.view, group.at
         found, moving = kind.together(group.observations, X[view], X[at], metric[view], metric[at])
         if group.powers is not None:
-            unit = twin.length**group.powers
+            unit = model.length**group.powers
             found, moving = found / unit, moving / unit[:, None]
         found.setflags(write=False)
         moving.setflags(write=False)
         for number, i in enumerate(group.members):
             rows = slice(number * kind.size, (number + 1) * kind.size)
             values[i], rates[i] = found[rows], moving[rows]
-    twin.measured = asked, q, (X[: len(links)], V[: len(links)], values, rates)
-    return twin.measured[2]
+    model.measured = asked, q, (X[: len(links)], V[: len(links)], values, rates)
+    return model.measured[2]
 
 
 def measure_together(
-    twin: PinocchioModel,
+    model: PinocchioModel,
     places: Sequence[Array],
     reference: str,
     observations: Sequence[Observation],
@@ -117,18 +117,18 @@ def measure_together(
     """At several configurations the loops' residuals (n, rows) and Jacobians (n, rows, nv), and what :func:`measure`
     gives there: (n, k, 4, 4), (n, k, 6, nv), all values (n, size) and rates (n, size, nv)."""
     names, whole, groups = _group_links(reference, tuple(observations), tuple(links))
-    errors, loops, X, V = twin.states(places, names, whole)
+    errors, loops, X, V = model.states(places, names, whole)
     metric = V
     if not all(group.kind.turns_only for group in groups):
         metric = V.copy()
-        metric[..., :3, :] *= twin.length
+        metric[..., :3, :] *= model.length
     size = sum(o.size for o in observations)
-    values, rates = np.empty((len(places), size)), np.empty((len(places), size, twin.nv))
+    values, rates = np.empty((len(places), size)), np.empty((len(places), size, model.nv))
     for group in groups:
         kind, view, at = group.kind, group.view, group.at
-        found, moving = kind.abreast(group.observations, X[:, view], X[:, at], metric[:, view], metric[:, at])
+        found, moving = kind.batched(group.observations, X[:, view], X[:, at], metric[:, view], metric[:, at])
         if group.powers is not None:
-            unit = twin.length**group.powers
+            unit = model.length**group.powers
             found, moving = found / unit, moving / unit[:, None]
         values[:, group.rows], rates[:, group.rows] = found, moving
     return errors, loops, X[:, : len(links)], V[:, : len(links)], values, rates

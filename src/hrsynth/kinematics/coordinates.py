@@ -19,10 +19,10 @@ from ..geometry.vectors import Array, orient_axis
 from ..results import Value
 from ..tolerances import NO_SLIDER, SAME_DIRECTION
 from .configuration import ClosedConfiguration
+from .continuation import track
 from .pinocchio_model import PinocchioModel
 from .platform_motion import PlatformMotion
-from .relation import Measurement, relation
-from .steps import track
+from .velocity_relation import ObservationModel, relation
 
 NAMES = ("x", "y", "z", "turn about x", "turn about y", "turn about z")
 INDEPENDENT = 0.5
@@ -39,10 +39,10 @@ class Coordinates(Value):
     values: Array
 
     @classmethod
-    def of(cls, start: ClosedConfiguration, question: Measurement, motion: PlatformMotion) -> Coordinates:
+    def of(cls, start: ClosedConfiguration, observation_model: ObservationModel, motion: PlatformMotion) -> Coordinates:
         """Those of a configuration that tell its neighbours apart well, positions before turns; where it has other
         freedoms than the platform generically has, those of the generic motion."""
-        twists = relation(start, question.of_platform).twists
+        twists = relation(start, observation_model.of_platform).twists
         if twists.shape[1] != motion.dof:
             twists = motion.twists
         if motion.rotations.shape[1] == 1:
@@ -86,12 +86,12 @@ class Coordinates(Value):
         turn = logarithm(R)
         return turn, logarithm_rate(turn)
 
-    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
+    def error_and_jacobian(self, model: PinocchioModel, q: Array) -> tuple[Array, Array]:
         """Error (reached − wanted) in characteristic lengths and radians, and its Jacobian."""
-        frames, velocities = twin.frames(q, (self.motion.link,))
+        frames, velocities = model.frames(q, (self.motion.link,))
         X, V = frames[0], velocities[0]
-        J = np.vstack([point_velocity(V, X[:3, :3] @ self.motion.point / twin.length), self._turn(X)[1] @ V[3:]])
-        scale = np.where(np.array(self.places) < 3, twin.length, 1.0)
+        J = np.vstack([point_velocity(V, X[:3, :3] @ self.motion.point / model.length), self._turn(X)[1] @ V[3:]])
+        scale = np.where(np.array(self.places) < 3, model.length, 1.0)
         return self.apart(X) / scale, J[list(self.places)]
 
     def towards(self, X: Array, fraction: float) -> Coordinates:

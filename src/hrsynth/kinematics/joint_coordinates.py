@@ -24,10 +24,10 @@ from ..results import Value
 from ..tolerances import AS_PRINTED, CLOSED, SAME_POINT, SOLVED
 from .assembly import of_links
 from .configuration import ClosedConfiguration
-from .limits import Stops
+from .continuation import STRIDE, nearest, track
+from .limits import CoordinateIntervals
 from .pinocchio_model import PinocchioModel
 from .platform_motion import PlatformMotion
-from .steps import STRIDE, nearest, track
 from .tasks import LinkPoses, solve
 
 COUNTED = (JointType.REVOLUTE, JointType.PRISMATIC, JointType.UNIVERSAL, JointType.CYLINDRICAL)
@@ -42,14 +42,14 @@ def counted_joints(robot: Mechanism, motors: bool = False) -> list[Joint]:
 def as_written(at: ClosedConfiguration) -> ClosedConfiguration | None:
     """A configuration in the joints that the robot's file has; None where the normal form has made one joint of
     several, and the poses of the links that are left do not fit the file's joints."""
-    robot = at.twin.mechanism.written or at.twin.mechanism
-    if all(joint.name in at.twin.coordinates for joint in counted_joints(robot)):
+    robot = at.model.mechanism.written or at.model.mechanism
+    if all(joint.name in at.model.coordinates for joint in counted_joints(robot)):
         return at
-    twin = _model(robot, at.twin.length)
-    kept = tuple((link, at.pose(link)) for link in robot.links if link in at.twin.mechanism.links)
-    start = twin.integrate(twin.q0, _shared(at.twin, at.q, twin))
-    q, residual = solve(twin, start, LinkPoses(kept), tolerance=SOLVED, iterations=100)
-    return ClosedConfiguration.of(twin, q) if residual <= CLOSED else None
+    model = _model(robot, at.model.length)
+    kept = tuple((link, at.pose(link)) for link in robot.links if link in at.model.mechanism.links)
+    start = model.integrate(model.q0, _shared(at.model, at.q, model))
+    q, residual = solve(model, start, LinkPoses(kept), tolerance=SOLVED, iterations=100)
+    return ClosedConfiguration.of(model, q) if residual <= CLOSED else None
 
 
 def read_joints(at: ClosedConfiguration) -> dict[str, tuple[float, ...]]:
@@ -58,11 +58,13 @@ def read_joints(at: ClosedConfiguration) -> dict[str, tuple[float, ...]]:
     own = as_written(at)
     if own is None:
         return {}
-    twin = own.twin
-    step = twin.difference(twin.q0, own.q)
+    model = own.model
+    step = model.difference(model.q0, own.q)
     return {
-        each.name: tuple((step[list(twin.coordinates[each.name])] * _units(each, twin.length) + _offset(each)).tolist())
-        for each in counted_joints(twin.mechanism)
+        each.name: tuple(
+            (step[list(model.coordinates[each.name])] * _units(each, model.length) + _offset(each)).tolist()
+        )
+        for each in counted_joints(model.mechanism)
     }
 
 
@@ -77,9 +79,9 @@ def _shared(one: PinocchioModel, q: Array, other: PinocchioModel) -> Array:
     configuration."""
     at, step = one.difference(one.q0, q), np.zeros(other.nv)
     for name, joint in one.mechanism.joints.items():
-        twin = other.mechanism.joints.get(name)
-        if twin is not None and joint.type == twin.type and joint.type in COUNTED[:2]:
-            zero = (_offset(joint) - _offset(twin)) / _units(joint, one.length)
+        model = other.mechanism.joints.get(name)
+        if model is not None and joint.type == model.type and joint.type in COUNTED[:2]:
+            zero = (_offset(joint) - _offset(model)) / _units(joint, one.length)
             step[other.coordinates[name][0]] = at[one.coordinates[name][0]] + zero[0]
     return step
 
@@ -105,9 +107,9 @@ class JointAim(Value):
     begun: Array
     values: Array
 
-    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
+    def error_and_jacobian(self, model: PinocchioModel, q: Array) -> tuple[Array, Array]:
         """Error (reached − wanted) and its Jacobian."""
-        return twin.difference(twin.q0, q)[self.places] - self.values, np.eye(twin.nv)[self.places]
+        return model.difference(model.q0, q)[self.places] - self.values, np.eye(model.nv)[self.places]
 
     def towards(self, X: Array, fraction: float) -> JointAim:
         """What lies ``fraction`` of the way; the platform's pose X (4, 4) says nothing here."""
@@ -121,24 +123,24 @@ def reach_joints(start: ClosedConfiguration, motion: PlatformMotion, asked: Join
     Raises ``BadRequest`` for unknown joints, their number and values beyond limits, ``PoseNotReached`` where the way
     ends before, saying which joint stops it.
     """
-    home, name = as_written(start), start.twin.mechanism.name
+    home, name = as_written(start), start.model.mechanism.name
     if home is None:
         raise PoseNotReached(name, str(asked), 0.0, "", reason="the file's joints do not fit its normal form")
     found = _lead(home, motion, _wanted(home, asked), asked)
     if home is start:
         return found
     try:
-        at = of_links(start.twin, found.pose)
-        turns = _shared(home.twin, found.q, start.twin) - _shared(start.twin, at.q, start.twin)
+        at = of_links(start.model, found.pose)
+        turns = _shared(home.model, found.q, start.model) - _shared(start.model, at.q, start.model)
         whole = 2 * np.pi * np.round(np.round(turns, 3) / (2 * np.pi))
-        return ClosedConfiguration.of(at.twin, at.twin.integrate(at.q, whole))
+        return ClosedConfiguration.of(at.model, at.model.integrate(at.q, whole))
     except LoopsNotClosed as error:
         raise PoseNotReached(name, str(asked), 1.0, "", reason=f"in normal form: {error}") from None
 
 
 def _wanted(home: ClosedConfiguration, asked: JointPose) -> dict[str, tuple[float, ...]]:
     """The coordinates by name: those that are asked for, and those of motors that stay as they are."""
-    robot = home.twin.mechanism
+    robot = home.model.mechanism
     joints = {joint.name: joint for joint in counted_joints(robot, asked.motors)}
     sizes = {name: joint.type.freedoms for name, joint in joints.items()}
     if asked.motors:
@@ -179,23 +181,23 @@ def _lead(
     """Steps from the zero configuration to coordinates, as many of them at a time as can be chosen one by one."""
     from scipy.linalg import qr
 
-    twin, robot = home.twin, home.twin.mechanism
+    model, robot = home.model, home.model.mechanism
     joints = [robot.joints[name] for name in wanted]
     names = [joint.name for joint in joints for _ in range(joint.type.freedoms)]
-    places = np.array([i for joint in joints for i in twin.coordinates[joint.name]])
-    values = np.concatenate([(wanted[each.name] - _offset(each)) / _units(each, twin.length) for each in joints])
-    rows = np.eye(twin.nv)[places] @ home.kernel()[0]
+    places = np.array([i for joint in joints for i in model.coordinates[joint.name]])
+    values = np.concatenate([(wanted[each.name] - _offset(each)) / _units(each, model.length) for each in joints])
+    rows = np.eye(model.nv)[places] @ home.kernel()[0]
     rank = range_basis(rows, 1.0)[1].value
     free = np.sort(qr(rows.T, mode="r", pivoting=True)[1][:rank])
-    at_zero = twin.difference(twin.q0, home.q)
-    every = np.array([i for joint in counted_joints(robot) for i in twin.coordinates[joint.name]])
+    at_zero = model.difference(model.q0, home.q)
+    every = np.array([i for joint in counted_joints(robot) for i in model.coordinates[joint.name]])
     rest = JointAim(every, at_zero[every], at_zero[every])
-    stops = Stops.of(twin, home.q)
-    before, here, came = stops.margins(twin, home.q), home, 0.0
+    stops = CoordinateIntervals.of(model, home.q)
+    before, here, came = stops.margins(model, home.q), home, 0.0
 
     def past(at: ClosedConfiguration) -> dict[str, float]:
         """The joints that are farther beyond their limits than they were, and by how much."""
-        margins = stops.margins(twin, at.q).items()
+        margins = stops.margins(model, at.q).items()
         return {joint: margin for joint, margin in margins if margin < min(before[joint], 0.0) - SAME_POINT}
 
     def refuse(stopped: str) -> PoseNotReached:
@@ -212,10 +214,10 @@ def _lead(
             raise refuse(f"{min(over, key=lambda joint: over[joint])} is at its limit")
         here, came = there, (number + part) / pieces
         if part < 1:
-            J = np.eye(twin.nv)[places[free]] @ here.kernel()[0]
+            J = np.eye(model.nv)[places[free]] @ here.kernel()[0]
             held = names[free[np.argmax(np.abs(np.linalg.svd(J)[0][:, -1]))]]
             raise refuse(f"a singularity lies ahead, at which {held} stops")
-    missed = np.abs(twin.difference(twin.q0, here.q)[places] - values)
+    missed = np.abs(model.difference(model.q0, here.q)[places] - values)
     if missed.max() > AS_PRINTED:
         joint = names[int(np.argmax(missed))]
         told = "/".join(f"{x:.6g}" for x in read_joints(here)[joint])
@@ -242,7 +244,7 @@ class FileCoordinates(Record, all_recorded=True):
     @classmethod
     def of(cls, at: ClosedConfiguration) -> FileCoordinates:
         """Those at a configuration."""
-        robot = at.twin.mechanism.written or at.twin.mechanism
+        robot = at.model.mechanism.written or at.model.mechanism
         found = {name: each[0] if len(each) == 1 else each for name, each in read_joints(at).items()}
         driven = {name: value for name, value in found.items() if robot.joints[name].actuated}
         return cls(driven, {name: value for name, value in found.items() if name not in driven})

@@ -17,7 +17,7 @@ from ..mechanism.legs import Leg, LegDecomposition, decompose
 from ..tolerances import AS_PRINTED, CLOSED, FOLLOWED, NO_NEARER, RANK_CUTOFF, SOLVED
 from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
-from .platform_motion import Goal, PlatformMotion
+from .platform_motion import PlatformMotion, PoseTask
 from .tasks import solve
 
 WAY = 10
@@ -31,47 +31,47 @@ HOPELESS = 100.0
 DAMPING = Damping(start=1e-3, eased=0.2, least=1e-12, most=1e7)
 
 
-def worst_leg(twin: PinocchioModel, motion: PlatformMotion, goal: Goal) -> LegMiss | None:
+def worst_leg(model: PinocchioModel, motion: PlatformMotion, goal: PoseTask) -> LegMiss | None:
     """The leg that alone misses a goal most, None where each leg reaches it: by its rods' lengths where that is more
     than these together, else by what a descent leaves.
 
     Each leg is taken with base and platform alone; the platform keeps to what it generically does.
     """
     try:
-        anatomy = decompose(twin.mechanism)
+        decomposition = decompose(model.mechanism)
     except HrsynthError:
         return None
     short = max(
-        ((float(each[0]), most, label) for label, most, each in rod_misses(anatomy, motion, [goal])),
+        ((float(each[0]), most, label) for label, most, each in rod_misses(decomposition, motion, [goal])),
         default=(0.0, 0.0, ""),
     )
     if short[0] > short[1]:
         return LegMiss(short[2], short[0], 0.0, True)
     misses = []
-    for leg in anatomy.legs:
-        error = _miss(PinocchioModel(alone(anatomy, leg), twin.length), motion, goal)
+    for leg in decomposition.legs:
+        error = _miss(PinocchioModel(alone(decomposition, leg), model.length), motion, goal)
         lengths, angles = np.split(error, [goal.lengths])
         misses.append(
             (
                 float(np.linalg.norm(error)),
-                LegMiss(leg.label, twin.length * float(np.linalg.norm(lengths)), float(np.linalg.norm(angles))),
+                LegMiss(leg.label, model.length * float(np.linalg.norm(lengths)), float(np.linalg.norm(angles))),
             )
         )
     size, worst = max(misses, key=lambda miss: miss[0])
     return worst if size > FOLLOWED else None
 
 
-def beyond_rods(mechanism: Mechanism, motion: PlatformMotion, goals: Sequence[Goal]) -> set[int]:
+def beyond_rods(mechanism: Mechanism, motion: PlatformMotion, goals: Sequence[PoseTask]) -> set[int]:
     """The places of goals that some leg misses by its rods' lengths."""
     try:
-        anatomy = decompose(mechanism)
+        decomposition = decompose(mechanism)
     except HrsynthError:
         return set()
-    return {int(i) for *_, misses in rod_misses(anatomy, motion, goals) for i in np.flatnonzero(misses > 0)}
+    return {int(i) for *_, misses in rod_misses(decomposition, motion, goals) for i in np.flatnonzero(misses > 0)}
 
 
 def rod_misses(
-    anatomy: LegDecomposition, motion: PlatformMotion, goals: Sequence[Goal]
+    decomposition: LegDecomposition, motion: PlatformMotion, goals: Sequence[PoseTask]
 ) -> Iterator[tuple[str, float, Array]]:
     """Of each leg its label, the sum of its rods' lengths to the platform's point, and by how much (n,) it misses goals
     at least, as these lengths tell (m); not positive where they do not.
@@ -88,7 +88,7 @@ def rod_misses(
     seen = np.array(
         [np.eye(3) if known else goal.directions.T @ goal.directions for goal, known in zip(goals, placed, strict=True)]
     ).reshape(-1, 3, 3)
-    for label, centres in _centres(anatomy, motion):
+    for label, centres in _centres(decomposition, motion):
         last = transform(inverse(motion.home), centres[-1])
         found, lengths = np.full(len(goals), -np.inf), list[float]()
         for known, home, arm in ((np.ones_like(turned), point, motion.point), (turned, centres[-1], last)):
@@ -101,12 +101,12 @@ def rod_misses(
         yield label, lengths[0], found
 
 
-def _centres(anatomy: LegDecomposition, motion: PlatformMotion) -> Iterator[tuple[str, Array]]:
+def _centres(decomposition: LegDecomposition, motion: PlatformMotion) -> Iterator[tuple[str, Array]]:
     """Of legs through which there are such chains the centres (n, 3) of the joints from the base to the platform."""
-    mechanism = anatomy.mechanism
+    mechanism = decomposition.mechanism
     centred = (JointType.REVOLUTE, JointType.UNIVERSAL, JointType.SPHERICAL)
-    for leg in anatomy.legs:
-        within = {mechanism.base, *anatomy.platform, motion.link, *leg.links}
+    for leg in decomposition.legs:
+        within = {mechanism.base, *decomposition.platform, motion.link, *leg.links}
         bonds = {
             frozenset(joint.links): joint
             for joint in mechanism.joints.values()
@@ -119,47 +119,49 @@ def _centres(anatomy: LegDecomposition, motion: PlatformMotion) -> Iterator[tupl
         yield leg.label, np.array([bonds[frozenset(pair)].point for pair in pairwise(links)])
 
 
-def alone(anatomy: LegDecomposition, leg: Leg) -> Mechanism:
+def alone(decomposition: LegDecomposition, leg: Leg) -> Mechanism:
     """One leg with base and platform, the other legs taken away."""
-    mechanism = anatomy.mechanism
-    kept = {mechanism.base, *anatomy.platform, *leg.links}
-    others = [name for other in anatomy.legs if other is not leg for name in other.joints]
+    mechanism = decomposition.mechanism
+    kept = {mechanism.base, *decomposition.platform, *leg.links}
+    others = [name for other in decomposition.legs if other is not leg for name in other.joints]
     return mechanism.changed(
         remove_links=set(mechanism.links) - kept, remove_joints=others, observations=(), camera=None
     )
 
 
-def _miss(twin: PinocchioModel, motion: PlatformMotion, goal: Goal) -> Array:
+def _miss(model: PinocchioModel, motion: PlatformMotion, goal: PoseTask) -> Array:
     """The error of a goal that is left when the leg comes as near as its loops and the platform's manner allow: from
     zero, else from wherever it comes nearest."""
-    at = ClosedConfiguration.of(twin, twin.q0, FOLLOWED)
+    at = ClosedConfiguration.of(model, model.q0, FOLLOWED)
     X, manner = at.pose(motion.link), motion.manner()
     for number in range(1, WAY + 1):
         at = _approach(at, goal.towards(X, number / WAY), manner, 200 if number == WAY else 10)
-    least = goal.rows(twin, at.q)[0]
+    least = goal.error_and_jacobian(model, at.q)[0]
     rng = np.random.default_rng(0)
     for _ in range(ASIDE):
         if np.linalg.norm(least) <= FOLLOWED:
             break
-        q, residual = solve(twin, twin.integrate(at.q, rng.uniform(-1, 1, twin.nv)), manner, tolerance=SOLVED)
+        q, residual = solve(model, model.integrate(at.q, rng.uniform(-1, 1, model.nv)), manner, tolerance=SOLVED)
         if residual <= CLOSED:
-            found = _approach(ClosedConfiguration.of(twin, q), goal, manner, 200, float(np.linalg.norm(least)))
-            least = min(least, goal.rows(twin, found.q)[0], key=lambda error: float(np.linalg.norm(error)))
+            found = _approach(ClosedConfiguration.of(model, q), goal, manner, 200, float(np.linalg.norm(least)))
+            least = min(
+                least, goal.error_and_jacobian(model, found.q)[0], key=lambda error: float(np.linalg.norm(error))
+            )
     return least
 
 
 def _approach(
-    at: ClosedConfiguration, goal: Goal, manner: Goal, iterations: int, known: float = np.inf
+    at: ClosedConfiguration, goal: PoseTask, manner: PoseTask, iterations: int, known: float = np.inf
 ) -> ClosedConfiguration:
     """Minimise a goal's error with the loops closed and ``manner`` kept: damped Gauss-Newton in the tangent space;
     given up where the error will not fall below the one that is ``known``."""
-    twin = at.twin
+    model = at.model
 
     def tangent(at: ClosedConfiguration) -> tuple[ClosedConfiguration, Array]:
-        return at, kernel_basis(np.vstack([twin.jacobian(at.q), manner.rows(twin, at.q)[1]]), 1.0)[0]
+        return at, kernel_basis(np.vstack([model.jacobian(at.q), manner.error_and_jacobian(model, at.q)[1]]), 1.0)[0]
 
     def evaluate(here: tuple[ClosedConfiguration, Array]) -> tuple[Array, Array]:
-        error, rows = goal.rows(twin, here[0].q)
+        error, rows = goal.error_and_jacobian(model, here[0].q)
         return error, rows @ here[1]
 
     def advance(
@@ -168,8 +170,8 @@ def _approach(
         damped = np.vstack([left.J, np.sqrt(factor) * np.eye(left.J.shape[1])])
         wanted = np.append(-left.error, np.zeros(left.J.shape[1]))
         step = here[1] @ np.linalg.lstsq(damped, wanted, rcond=None)[0]
-        q, residual = solve(twin, twin.integrate(here[0].q, step), manner, tolerance=SOLVED)
-        return tangent(ClosedConfiguration.of(twin, q)) if residual <= CLOSED else None
+        q, residual = solve(model, model.integrate(here[0].q, step), manner, tolerance=SOLVED)
+        return tangent(ClosedConfiguration.of(model, q)) if residual <= CLOSED else None
 
     sizes: list[float] = []
 

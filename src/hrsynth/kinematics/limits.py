@@ -1,5 +1,5 @@
-"""Limits of joints, and of spherical joints that stand for several R (:mod:`mechanism.wrist`): whether a configuration
-asks for a coordinate or a turn beyond them, and the proof that every closure of a leg does."""
+"""Limits of joints, and of spherical joints that stand for several R (:mod:`mechanism.tilt_limit`): whether a
+configuration asks for a coordinate or a turn beyond them, and the proof that every closure of a leg does."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from ..geometry import lines
 from ..geometry.balls import Field, around
 from ..geometry.vectors import Array, dot
 from ..mechanism import Joint, JointType, Mechanism
-from ..mechanism.wrist import Wrist
+from ..mechanism.tilt_limit import TiltLimit
 from ..tolerances import OUT_OF_REACH, SAME_GEOMETRY, SAME_POINT
 from .configuration import ClosedConfiguration
+from .leg_paths import MotionFactor
 from .pinocchio_model import PinocchioModel
-from .ways import Part
 
 SINGLE = (JointType.REVOLUTE, JointType.PRISMATIC)
 """Joints with one coordinate that may have limits."""
@@ -27,7 +27,7 @@ AT_END = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
-class Stops:
+class CoordinateIntervals:
     """What stops the joints of a robot that moves on from a configuration: of each coordinate with limits the interval
     (m, rad) of its coordinate. Turns are not counted modulo 2π on the way, but where the way begins: a coordinate
     beyond the limits that a whole turn brings between them is taken as that one."""
@@ -35,22 +35,22 @@ class Stops:
     spans: Mapping[str, tuple[float, float]]
 
     @classmethod
-    def of(cls, twin: PinocchioModel, q: Array) -> Stops:
+    def of(cls, model: PinocchioModel, q: Array) -> CoordinateIntervals:
         """Those of a way that begins at q."""
-        stops, joints, spans = twin.mechanism.stops, twin.mechanism.joints, dict[str, tuple[float, float]]()
-        for name, value in coordinates(twin, q).items():
+        stops, joints, spans = model.mechanism.stops, model.mechanism.joints, dict[str, tuple[float, float]]()
+        for name, value in coordinates(model, q).items():
             joint, _, *span = stops[name]
             spans[name] = (span[0], span[1]) if joints[joint].type.slides else _about(value, *span)
         return cls(spans)
 
-    def margins(self, twin: PinocchioModel, q: Array) -> dict[str, float]:
+    def margins(self, model: PinocchioModel, q: Array) -> dict[str, float]:
         """How far each joint, and each wrist, is from the nearer limit (m, rad); negative beyond it."""
         found = {
             name: min(value - lower, upper - value)
-            for name, value in coordinates(twin, q).items()
+            for name, value in coordinates(model, q).items()
             for lower, upper in (self.spans[name],)
         }
-        return found | wrist_margins(twin, q)
+        return found | wrist_margins(model, q)
 
 
 def _about(value: float, lower: float, upper: float) -> tuple[float, float]:
@@ -64,61 +64,61 @@ def _about(value: float, lower: float, upper: float) -> tuple[float, float]:
     return lower + shift, upper + shift
 
 
-def coordinates(twin: PinocchioModel, q: Array) -> dict[str, float]:
+def coordinates(model: PinocchioModel, q: Array) -> dict[str, float]:
     """The coordinate (m, rad) of each R or P that has limits, by the name that it has in the file."""
-    step, joints = twin.difference(twin.q0, q), twin.mechanism.joints
+    step, joints = model.difference(model.q0, q), model.mechanism.joints
     return {
-        name: float(step[twin.coordinates[joint][place]]) * (twin.length if joints[joint].type.slides else 1.0)
-        for name, (joint, place, *_) in twin.mechanism.stops.items()
-        if joint in twin.coordinates and (joints[joint].type in SINGLE or joints[joint].turns)
+        name: float(step[model.coordinates[joint][place]]) * (model.length if joints[joint].type.slides else 1.0)
+        for name, (joint, place, *_) in model.mechanism.stops.items()
+        if joint in model.coordinates and (joints[joint].type in SINGLE or joints[joint].turns)
     }
 
 
-def wrist_margins(twin: PinocchioModel, q: Array) -> dict[str, float]:
+def wrist_margins(model: PinocchioModel, q: Array) -> dict[str, float]:
     """How far each wrist is from the nearer end of its interval (rad); negative beyond it."""
-    return {name: _carried(twin, q, name, wrist).margin() for name, wrist in twin.mechanism.wrists.items()}
+    return {name: _carried(model, q, name, wrist).margin() for name, wrist in model.mechanism.tilt_limits.items()}
 
 
-def flat_wrists(twin: PinocchioModel, q: Array) -> dict[str, float]:
+def flat_wrists(model: PinocchioModel, q: Array) -> dict[str, float]:
     """Spherical joints that stand for several R whose axes nearly lie in a plane, where they turn in two ways only, and
     how far they are from it (rad)."""
     every = {
-        name: _carried(twin, q, name, joint.wrist).flatness()
-        for name, joint in twin.mechanism.joints.items()
+        name: _carried(model, q, name, joint.wrist).flatness()
+        for name, joint in model.mechanism.joints.items()
         if joint.wrist is not None
     }
     return {name: flatness for name, flatness in every.items() if flatness < AT_END}
 
 
-def _carried(twin: PinocchioModel, q: Array, name: str, wrist: Wrist) -> Wrist:
-    mechanism = twin.mechanism
+def _carried(model: PinocchioModel, q: Array, name: str, wrist: TiltLimit) -> TiltLimit:
+    mechanism = model.mechanism
     return wrist.carried(
-        *(twin.pose(q, link)[:3, :3] @ mechanism.links[link].pose[:3, :3].T for link in mechanism.joints[name].links)
+        *(model.pose(q, link)[:3, :3] @ mechanism.links[link].pose[:3, :3].T for link in mechanism.joints[name].links)
     )
 
 
-def wrists_beyond(twin: PinocchioModel, q: Array) -> list[str]:
+def wrists_beyond(model: PinocchioModel, q: Array) -> list[str]:
     """The wrists that would have to make a turn that they cannot."""
-    return [name for name, margin in wrist_margins(twin, q).items() if margin < -SAME_POINT]
+    return [name for name, margin in wrist_margins(model, q).items() if margin < -SAME_POINT]
 
 
-def outside(twin: PinocchioModel, q: Array, joints: Sequence[str] | None = None) -> list[str]:
+def outside(model: PinocchioModel, q: Array, joints: Sequence[str] | None = None) -> list[str]:
     """Those joints (default: of all), turning or sliding about one axis, whose coordinates are outside their limits
     (turns count modulo 2π), and the wrists beyond their intervals."""
-    mechanism = twin.mechanism
+    mechanism = model.mechanism
     joints = [*mechanism.joints] if joints is None else joints
-    return [name for name in wrists_beyond(twin, q) if name in joints] + [
+    return [name for name in wrists_beyond(model, q) if name in joints] + [
         name
-        for name, value in coordinates(twin, q).items()
+        for name, value in coordinates(model, q).items()
         if mechanism.stops[name].joint in joints and is_excluded(mechanism, name, value, value)
     ]
 
 
-def surely_outside(twin: PinocchioModel, q: Array, bodies: Iterable[str], within: float) -> bool:
+def is_proved_outside(model: PinocchioModel, q: Array, bodies: Iterable[str], within: float) -> bool:
     """Whether a joint has one value only, but for whole turns, and is beyond its limits: it joins two of these bodies,
     whose poses are known to ``within`` (characteristic lengths, radians), or links that two parallel R join to them."""
-    mechanism, within = twin.mechanism, max(within, OUT_OF_REACH)
-    doubts = dict.fromkeys(bodies, (within * twin.length, within))
+    mechanism, within = model.mechanism, max(within, OUT_OF_REACH)
+    doubts = dict.fromkeys(bodies, (within * model.length, within))
 
     def doubt(joint: Joint, link: str) -> float:
         """How far a joint's centre on a link can be from where it is (m)."""
@@ -133,12 +133,12 @@ def surely_outside(twin: PinocchioModel, q: Array, bodies: Iterable[str], within
         ]
         for one, other in combinations(hinges, 2):
             apart = lines.distance(other.point, one.point, one.axis)
-            if lines.parallel(one.axis, other.axis) and apart > SAME_POINT * twin.length:
+            if lines.parallel(one.axis, other.axis) and apart > SAME_POINT * model.length:
                 ends = [doubt(joint, joint.other(link)) for joint in (one, other)]
                 turn = 2 * sum(ends) / apart + doubts[one.other(link)][1]
                 arm = float(np.linalg.norm(mechanism.links[link].pose[:3, 3] - one.point))
                 doubts[link] = ends[0] + turn * arm, turn
-    for name, value in coordinates(twin, q).items():
+    for name, value in coordinates(model, q).items():
         joint = mechanism.joints[mechanism.stops[name].joint]
         if all(link in doubts for link in joint.links):
             turn = sum(doubts[link][1] for link in joint.links)
@@ -171,11 +171,13 @@ def all_excluded(mechanism: Mechanism, joint: str, values: Sequence[Any]) -> boo
 
 def at_end(at: ClosedConfiguration) -> str | None:
     """The wrist nearest to an end of its interval, where it is there."""
-    name, margin = min(wrist_margins(at.twin, at.q).items(), key=lambda item: item[1], default=(None, np.inf))
+    name, margin = min(wrist_margins(at.model, at.q).items(), key=lambda item: item[1], default=(None, np.inf))
     return name if margin < AT_END else None
 
 
-def never(way: Sequence[Part], values: Mapping[str, Sequence[Any]], D: Array, within: float, alone: bool) -> bool:
+def is_tilt_excluded(
+    way: Sequence[MotionFactor], values: Mapping[str, Sequence[Any]], D: Array, within: float, alone: bool
+) -> bool:
     """Whether the wrist on a way is beyond its interval in all closures, as balls: of every other part that turns all
     ``values`` are known, in one order where the way is ``alone``, and it ends displaced by D (4, 4), each number known
     to ``within``."""
@@ -191,7 +193,9 @@ def never(way: Sequence[Part], values: Mapping[str, Sequence[Any]], D: Array, wi
     return all(_outside(wrist, _cosine(wrist, before, after, turns, end)) for turns in closures)
 
 
-def _cosine(wrist: Wrist, before: Sequence[Part], after: Sequence[Part], turns: Sequence[Any], end: Field) -> Any:
+def _cosine(
+    wrist: TiltLimit, before: Sequence[MotionFactor], after: Sequence[MotionFactor], turns: Sequence[Any], end: Field
+) -> Any:
     """E_1 … E_k first · D E_n⁻¹ … E_l⁻¹ last, for the parts before and after the wrist turned by ``turns``."""
     first, last = (around(axis, SAME_GEOMETRY) for axis in (wrist.first, wrist.last))
     for part, q in reversed(list(zip(before, turns, strict=False))):
@@ -201,7 +205,7 @@ def _cosine(wrist: Wrist, before: Sequence[Part], after: Sequence[Part], turns: 
     return dot(first, dot(end, last))[()]
 
 
-def _outside(wrist: Wrist, cosine: Any) -> bool:
+def _outside(wrist: TiltLimit, cosine: Any) -> bool:
     """Whether a wrist is beyond its interval, by a ball of the cosine."""
     return bool(
         (wrist.upper is not None and cosine < np.cos(wrist.upper) - SAME_POINT)

@@ -20,11 +20,11 @@ from ..results import Value
 from ..tolerances import AS_PRINTED, RANK_CUTOFF
 from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
-from .relation import Measurement, relation
+from .velocity_relation import ObservationModel, relation
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Goal(Value):
+class PoseTask(Value):
     """Parts of the pose of ``link`` that are wanted: ``directions`` (k, 3) · position of ``point`` = ``values`` (k,)
     metres, the turn ``phi`` about ``normal`` since the orientation ``zero``, the whole orientation ``rotation``, or
     (``axis``) no turn but about that base direction. The point is given in the link's frame."""
@@ -39,13 +39,13 @@ class Goal(Value):
     rotation: Array | None = None
     axis: Array | None = None
 
-    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
+    def error_and_jacobian(self, model: PinocchioModel, q: Array) -> tuple[Array, Array]:
         """Error (reached − wanted) and its Jacobian, (rows,) and (rows, nv)."""
-        frames, velocities = twin.frames(q, (self.link,))
+        frames, velocities = model.frames(q, (self.link,))
         X, V = frames[0], velocities[0]
         R = X[:3, :3]
-        errors = [(self.directions @ (R @ self.point + X[:3, 3]) - self.values) / twin.length]
-        blocks = [self.directions @ point_velocity(V, X[:3, :3] @ self.point / twin.length)]
+        errors = [(self.directions @ (R @ self.point + X[:3, 3]) - self.values) / model.length]
+        blocks = [self.directions @ point_velocity(V, X[:3, :3] @ self.point / model.length)]
         if self.phi is not None:
             angle, row = turn_about(self.normal, R @ self.zero.T)
             errors.append(np.array([wrap_angle(angle - self.phi)]))
@@ -79,7 +79,7 @@ class Goal(Value):
         """How many of the rows are lengths; they come first."""
         return len(self.values)
 
-    def towards(self, X: Array, fraction: float) -> Goal:
+    def towards(self, X: Array, fraction: float) -> PoseTask:
         """The goal that lies ``fraction`` of the way from the pose X (4, 4) to this one."""
         if fraction >= 1:
             return self
@@ -119,21 +119,31 @@ class PlatformMotion(Value):
     """How poses are told."""
 
     @classmethod
-    def of(cls, configurations: Iterable[ClosedConfiguration], question: Measurement) -> PlatformMotion:
+    def of(cls, configurations: Iterable[ClosedConfiguration], observation_model: ObservationModel) -> PlatformMotion:
         """The motion that generic configurations show."""
-        asked = question.of_platform
-        point = np.zeros(3) if question.point is None else question.point
+        asked = observation_model.of_platform
+        point = np.zeros(3) if observation_model.point is None else observation_model.point
         columns = []
         for at in configurations:
             found = np.zeros((6, (basis := relation(at, asked).twists).shape[1]))
             found[: len(basis)] = basis
             columns.append(found)
-            twin = at.twin
+            model = at.model
         together = np.hstack(columns)
         translations, rotations, twists = (space_basis(part, 1.0) for part in (together[:3], together[3:], together))
-        home, dof = twin.pose(twin.q0, question.platform), max(column.shape[1] for column in columns)
+        home, dof = model.pose(model.q0, observation_model.platform), max(column.shape[1] for column in columns)
         shifts = max(range_basis(column[:3], 1.0)[1].value for column in columns)
-        return cls(question.platform, point, question.point is None, home, translations, rotations, twists, dof, shifts)
+        return cls(
+            observation_model.platform,
+            point,
+            observation_model.point is None,
+            home,
+            translations,
+            rotations,
+            twists,
+            dof,
+            shifts,
+        )
 
     @property
     def normal(self) -> Array:
@@ -191,7 +201,7 @@ class PlatformMotion(Value):
             del parts["rpy"]
         return replace(found, shown=write_parts(parts, self.form.degrees or "phi" in parts))
 
-    def goal(self, pose: Pose, robot: str = "the robot") -> Goal:
+    def goal(self, pose: Pose, robot: str = "the robot") -> PoseTask:
         """The goal that a pose asks for; raises ``BadRequest`` for parts that the platform cannot change."""
         constant = [name for name in pose.given if name not in self.parts]
         for name in constant:
@@ -210,9 +220,9 @@ class PlatformMotion(Value):
                 )
         placed = [i for i, name in enumerate("xyz") if name in pose.given]
         values = np.array([getattr(pose, "xyz"[i]) for i in placed], dtype=float)
-        return Goal(self.link, self.point, self.home[:3, :3], np.eye(3)[placed], values, normal, phi, rotation)
+        return PoseTask(self.link, self.point, self.home[:3, :3], np.eye(3)[placed], values, normal, phi, rotation)
 
-    def pose_of(self, goal: Goal) -> Array:
+    def pose_of(self, goal: PoseTask) -> Array:
         """The platform pose (4, 4) that a goal asks for, its free parts as near to home as they can be."""
         X, home = self.home.copy(), self.position(self.home)
         if goal.rotation is not None:
@@ -224,7 +234,7 @@ class PlatformMotion(Value):
         X[:3, 3] = home + way - X[:3, :3] @ self.point
         return X
 
-    def is_placed(self, goal: Goal) -> bool:
+    def is_placed(self, goal: PoseTask) -> bool:
         """Whether a goal leaves the point no translation."""
         k = self.translations.shape[1]
         return not k or (
@@ -232,7 +242,7 @@ class PlatformMotion(Value):
             and bool(np.linalg.matrix_rank(goal.directions @ self.translations, tol=RANK_CUTOFF) == k)
         )
 
-    def turns_left(self, goal: Goal) -> int:
+    def turns_left(self, goal: PoseTask) -> int:
         """How many of the platform's turns a goal leaves free."""
         return 0 if goal.rotation is not None else self.rotations.shape[1] - (goal.phi is not None)
 
@@ -243,10 +253,10 @@ class PlatformMotion(Value):
             return abs(float(getattr(pose, name)) - float(here)) <= AS_PRINTED
         return pose.rotation is not None and float(np.linalg.norm(pose.rotation - self.home[:3, :3])) <= AS_PRINTED
 
-    def at_home(self) -> Goal:
+    def at_home(self) -> PoseTask:
         """The goal of the whole pose at the zero configuration: what free parts are nearest to."""
         R = self.home[:3, :3]
-        return Goal(
+        return PoseTask(
             self.link,
             self.point,
             R,
@@ -256,17 +266,17 @@ class PlatformMotion(Value):
             rotation=R if self.body else None,
         )
 
-    def whole(self, X: Array) -> Goal:
+    def whole(self, X: Array) -> PoseTask:
         """The goal of the whole platform pose X (4, 4), as far as the platform's pose counts."""
         return replace(self.at_home(), values=self.position(X), rotation=X[:3, :3] if self.body else None)
 
-    def manner(self) -> Goal:
+    def manner(self) -> PoseTask:
         """What the platform never changes: where its point does not move, turns that it does not make (or makes about
         one axis only)."""
         k = self.translations.shape[1]
         fixed = np.linalg.svd(self.translations.T)[2][k:] if k else np.eye(3)
         R = self.home[:3, :3]
-        goal = Goal(self.link, self.point, R, fixed, fixed @ self.position(self.home), self.normal)
+        goal = PoseTask(self.link, self.point, R, fixed, fixed @ self.position(self.home), self.normal)
         if not self.body or self.rotations.shape[1] > 1:
             return goal
         return replace(goal, axis=self.rotations[:, 0]) if self.rotations.shape[1] else replace(goal, rotation=R)

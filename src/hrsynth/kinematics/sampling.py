@@ -16,7 +16,7 @@ from typing import TypeVar
 import numpy as np
 
 from ..budgets import EASY_ITERATIONS
-from ..errors import BadMechanism, NotMeasured, NotSampled
+from ..errors import BadMechanism, NotSampled, UndefinedValue
 from ..geometry.ranks import range_bases
 from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
@@ -30,11 +30,9 @@ from ..tolerances import (
     SURELY_SOMETHING,
     UNMOVING,
 )
-from .branch import OperationMode, Signature, alike_along, group_modes, turns_of
+from .branch_tests import OperationMode, Signature, alike_along, group_modes, turns_of
 from .configuration import ClosedConfiguration
-from .pinocchio_model import PinocchioModel
-from .relation import Measurement, Relation, relation, relations
-from .sampled_mode import (
+from .operation_modes import (
     STEPS,
     far_walks,
     firmest,
@@ -46,8 +44,10 @@ from .sampled_mode import (
     ways_out,
     well_closed,
 )
-from .tasks import Places, Target, shorten_step, solve_together
-from .tracking import track_paths
+from .path_tracking import track_paths
+from .pinocchio_model import PinocchioModel
+from .tasks import PoseAndValuesTask, TaskBatch, shorten_step, solve_together
+from .velocity_relation import ObservationModel, VelocityRelation, relation, relations
 from .walking import HALVED, STEP, WEAKEST, any_velocity, lands_beside, step_along
 
 X = TypeVar("X")
@@ -62,8 +62,8 @@ class Sample(Value):
     there."""
 
     configuration: ClosedConfiguration
-    way: tuple[Target, ...]
-    relation: Relation
+    way: tuple[PoseAndValuesTask, ...]
+    relation: VelocityRelation
 
     @cached_property
     def shown(self) -> list[int]:
@@ -78,12 +78,12 @@ class Samples(Value):
     """Samples of one mechanism for one question; ``discarded`` draws did not stay on the branch or came too near to a
     singularity. ``met`` are other operation modes that steps too long would have led to."""
 
-    question: Measurement
-    twin: PinocchioModel
+    observation_model: ObservationModel
+    model: PinocchioModel
     start: ClosedConfiguration
     members: tuple[Sample, ...]
     discarded: int
-    met: tuple[OperationMode, ...] = ()
+    other_modes: tuple[OperationMode, ...] = ()
     led: bool = True
     """Whether the robot finds all samples again, led along their ways: not where its zero configuration is special."""
 
@@ -99,8 +99,8 @@ class Samples(Value):
 
 
 def sample(
-    twin: PinocchioModel,
-    question: Measurement,
+    model: PinocchioModel,
+    observation_model: ObservationModel,
     count: int,
     seed: int = 0,
     *,
@@ -112,32 +112,42 @@ def sample(
     The robot should find its way again led by the platform's pose and the observations ``led_by`` (default: all); where
     it does not, the samples say so. Idle motions are left out of the walks where that shows what is generic.
     """
-    leading = {o.key for o in (question.observations if led_by is None else led_by)}
-    start = ClosedConfiguration.of(twin, twin.q0)
-    moves = relation(start, question).dimension > 0
+    leading = {o.key for o in (observation_model.observations if led_by is None else led_by)}
+    start = ClosedConfiguration.of(model, model.q0)
+    moves = relation(start, observation_model).dimension > 0
     if not moves and not start.kernel()[0].shape[1]:
         raise BadMechanism(
-            f"{twin.mechanism.name}: its loops let no link move", None, "a mechanism with at least one freedom"
+            f"{model.mechanism.name}: its loops let no link move", None, "a mechanism with at least one freedom"
         )
     rng = np.random.default_rng(seed)
     regular = is_regular(start, rng)
-    roots = [start] if regular and moves else ways_out(start, question, rng, singular=not regular)
+    roots = [start] if regular and moves else ways_out(start, observation_model, rng, singular=not regular)
     for freely in (False, True):
-        walks = _Walks(question, leading, np.random.default_rng(seed), freely)
+        walks = _Walks(observation_model, leading, np.random.default_rng(seed), freely)
         members, discarded, led = walks.sample(roots, count)
         signatures = [Signature.of(member.relation) for member in members]
         if freely or not (far := far_walks(roots[0])):
             break
-        probe = mode_at(firmest(far), question)
+        probe = mode_at(firmest(far), observation_model)
         if probe is None or all(map(probe.signature.agrees, signatures)):
             break
     require_motions([member.configuration for member in members])
     groups = group_modes(
         [OperationMode(each, member.configuration) for each, member in zip(signatures, members, strict=True)]
     )
-    require_one(groups, question, "the configurations reached differ as only those of several operation modes do")
+    require_one(
+        groups, observation_model, "the configurations reached differ as only those of several operation modes do"
+    )
     own = groups[0][0].signature
-    return Samples(question, twin, start, tuple(members), discarded, other_modes(walks.beyond, own, question), led)
+    return Samples(
+        observation_model,
+        model,
+        start,
+        tuple(members),
+        discarded,
+        other_modes(walks.beyond, own, observation_model),
+        led,
+    )
 
 
 @dataclass(eq=False)
@@ -150,7 +160,7 @@ class _Walker:
     weakest: float
     wish: Array | None = None
     passed: Sequence[ClosedConfiguration] = ()
-    way: list[Target | None] = field(default_factory=list)
+    way: list[PoseAndValuesTask | None] = field(default_factory=list)
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,9 +200,9 @@ class _Walks:
     that too long steps came to."""
 
     def __init__(
-        self, question: Measurement, leading: set[tuple[str, ...]], rng: np.random.Generator, freely: bool
+        self, observation_model: ObservationModel, leading: set[tuple[str, ...]], rng: np.random.Generator, freely: bool
     ) -> None:
-        self.question, self.leading, self.rng, self.freely = question, leading, rng, freely
+        self.question, self.leading, self.rng, self.freely = observation_model, leading, rng, freely
         self.beyond: list[ClosedConfiguration] = []
 
     def sample(self, roots: Sequence[ClosedConfiguration], count: int) -> tuple[list[Sample], int, bool]:
@@ -209,20 +219,20 @@ class _Walks:
         if len(members) == count:
             return members, discarded + len(lonely), True
         if len(members) + len(lonely) < count:
-            raise NotSampled(roots[0].twin.mechanism.name, len(members) + len(lonely), count, draws)
+            raise NotSampled(roots[0].model.mechanism.name, len(members) + len(lonely), count, draws)
         return [*members, *lonely][:count], discarded, False
 
     def _finds_again(self, samples: Sequence[Sample]) -> Iterator[bool]:
         """Whether the robot, led along the way of each sample, arrives."""
         ways = [[target.of(lambda o: o.key in self.leading) for target in sample.way] for sample in samples]
-        for led in track_paths(samples[0].configuration.twin, ways, EASY_ITERATIONS) if ways else ():
-            yield not isinstance(led, NotMeasured) and led[1] <= FOLLOWED
+        for led in track_paths(samples[0].configuration.model, ways, EASY_ITERATIONS) if ways else ():
+            yield not isinstance(led, UndefinedValue) and led[1] <= FOLLOWED
 
     def walk(self, starts: Sequence[ClosedConfiguration]) -> list[Sample]:
         """The samples at the ends of random walks from these configurations, in step; without those that are blocked,
         or whose ranks are not clear."""
-        question = self.question
-        noise = self.rng.normal(size=(len(starts), STEPS + 1, question.size))
+        observation_model = self.question
+        noise = self.rng.normal(size=(len(starts), STEPS + 1, observation_model.size))
         walkers = [
             _Walker(start, iter(own), WEAKEST * start.kernel()[1].weakest)
             for start, own in zip(starts, noise, strict=True)
@@ -237,7 +247,7 @@ class _Walks:
                     )
             walkers = self._step(walkers)
             passed = [(walker, at) for walker in walkers for at in walker.passed]
-            targets = _measure_all(question.targets, [at for _, at in passed])
+            targets = _measure_all(observation_model.targets, [at for _, at in passed])
             for (walker, _), target in zip(passed, targets, strict=True):
                 walker.way.append(target)
             walkers = [walker for walker in walkers if None not in walker.way]
@@ -246,7 +256,9 @@ class _Walks:
             for walker in walkers
             if (at := well_closed(walker.here)) is not None
         ]
-        found = _measure_all(lambda at: relations(at, question, question.rows_together(at)), [at for at, _ in steady])
+        found = _measure_all(
+            lambda at: relations(at, observation_model, observation_model.rows_together(at)), [at for at, _ in steady]
+        )
         return [
             Sample(at, tuple(way), each)
             for (at, way), each in zip(steady, found, strict=True)
@@ -332,12 +344,12 @@ class _Walks:
 
     def _parts(self, strides: Sequence[_Stride]) -> list[ClosedConfiguration | None]:
         """As :func:`.walking.step_along`, of the next part of several steps."""
-        twin, tangents = strides[0].here.twin, [stride.tangent() for stride in strides]
-        predicted = [twin.integrate(stride.here.q, tangent) for stride, tangent in zip(strides, tangents, strict=True)]
-        solved = solve_together(Places(twin, None), predicted, [None] * len(strides), tolerance=SOLVED)
+        model, tangents = strides[0].here.model, [stride.tangent() for stride in strides]
+        predicted = [model.integrate(stride.here.q, tangent) for stride, tangent in zip(strides, tangents, strict=True)]
+        solved = solve_together(TaskBatch(model, None), predicted, [None] * len(strides), tolerance=SOLVED)
         closed = [k for k, (_, residual) in enumerate(solved) if residual <= CLOSED]
         found: list[ClosedConfiguration | None] = [None] * len(strides)
-        for k, there in zip(closed, ClosedConfiguration.several(twin, [solved[k][0] for k in closed]), strict=True):
+        for k, there in zip(closed, ClosedConfiguration.several(model, [solved[k][0] for k in closed]), strict=True):
             if lands_beside(strides[k].here, tangents[k], predicted[k], there):
                 found[k] = there
             elif strides[k].part == 1:
@@ -351,5 +363,5 @@ def _measure_all(
     """What is asked of several configurations together; None at those where it cannot be measured."""
     try:
         return list(ask(list(places))) if places else []
-    except NotMeasured:
+    except UndefinedValue:
         return [None] if len(places) == 1 else [each for place in places for each in _measure_all(ask, [place])]

@@ -29,7 +29,7 @@ DAMPING = Damping(start=1.0, eased=0.1, least=0.1, most=1e8)
 class Task(Protocol):
     """What a configuration is to reach besides closed loops."""
 
-    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
+    def error_and_jacobian(self, model: PinocchioModel, q: Array) -> tuple[Array, Array]:
         """Error (reached − wanted) and its Jacobian."""
 
 
@@ -41,29 +41,31 @@ class GuidedTask(Task, Protocol):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Held(Value):
+class FixedValuesTask(Value):
     """Measured values that are to stay as they are, seen from ``reference`` where an observation names no link."""
 
     reference: str
     measured: tuple[tuple[Observation, Array], ...]
 
     @classmethod
-    def at(cls, twin: PinocchioModel, q: Array, reference: str, observations: Sequence[Observation]) -> Held:
+    def at(
+        cls, model: PinocchioModel, q: Array, reference: str, observations: Sequence[Observation]
+    ) -> FixedValuesTask:
         """As they are at a configuration."""
-        values = measure(twin, q, reference, observations)[2] if observations else []
+        values = measure(model, q, reference, observations)[2] if observations else []
         return cls(reference, tuple(zip(observations, values, strict=True)))
 
-    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
+    def error_and_jacobian(self, model: PinocchioModel, q: Array) -> tuple[Array, Array]:
         """Error (reached − wanted) and its Jacobian."""
         if not self.measured:
-            return np.zeros(0), np.zeros((0, twin.nv))
-        _, _, values, rates = measure(twin, q, self.reference, [o for o, _ in self.measured])
-        errors = [o.apart(value, wanted) for value, (o, wanted) in zip(values, self.measured, strict=True)]
+            return np.zeros(0), np.zeros((0, model.nv))
+        _, _, values, rates = measure(model, q, self.reference, [o for o, _ in self.measured])
+        errors = [o.difference(value, wanted) for value, (o, wanted) in zip(values, self.measured, strict=True)]
         return np.concatenate(errors), np.concatenate(rates)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Target(Value):
+class PoseAndValuesTask(Value):
     """What a configuration is to reach besides closed loops: the pose X_BP of ``link`` (only the position of ``point``,
     given in the link's frame, where there is one), and measured values."""
 
@@ -73,21 +75,21 @@ class Target(Value):
     reference: str
     measured: tuple[tuple[Observation, Array], ...]
 
-    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
+    def error_and_jacobian(self, model: PinocchioModel, q: Array) -> tuple[Array, Array]:
         """Error (reached − wanted) and its Jacobian."""
         observations = tuple(o for o, _ in self.measured)
-        frames, velocities, values, rates = measure(twin, q, self.reference, observations, (self.link,))
+        frames, velocities, values, rates = measure(model, q, self.reference, observations, (self.link,))
         X, V = frames[0], velocities[0]
-        block = V if self.point is None else point_velocity(V, X[:3, :3] @ self.point / twin.length)
-        apart = (o.apart(value, wanted) for value, (o, wanted) in zip(values, self.measured, strict=True))
-        (missed,) = self.misses([self], X[None], twin.length)
+        block = V if self.point is None else point_velocity(V, X[:3, :3] @ self.point / model.length)
+        apart = (o.difference(value, wanted) for value, (o, wanted) in zip(values, self.measured, strict=True))
+        (missed,) = self.misses([self], X[None], model.length)
         return np.concatenate([missed, *apart]), np.concatenate([block, *rates])
 
-    def of(self, chosen: Callable[[Observation], bool]) -> Target:
+    def of(self, chosen: Callable[[Observation], bool]) -> PoseAndValuesTask:
         """The same pose, with some of the measured values."""
         return replace(self, measured=tuple(pair for pair in self.measured if chosen(pair[0])))
 
-    def between(self, other: Target, fraction: float) -> Target:
+    def between(self, other: PoseAndValuesTask, fraction: float) -> PoseAndValuesTask:
         """What lies ``fraction`` of the way from this target to another of the same kind, all values in proportion."""
         if fraction == 1:
             return other
@@ -109,7 +111,7 @@ class Target(Value):
         return np.concatenate([np.zeros(0), *(value for _, value in self.measured)])
 
     @staticmethod
-    def misses(targets: Sequence[Target], X: Array, length: float) -> Array:
+    def misses(targets: Sequence[PoseAndValuesTask], X: Array, length: float) -> Array:
         """By how much poses X (n, 4, 4) miss those of targets of one kind, or their points: characteristic lengths,
         radians (n, 6 or 3)."""
         wanted, point = np.array([target.pose for target in targets]), targets[0].point
@@ -139,16 +141,18 @@ class LinkPoses:
     wanted: tuple[tuple[str, Array], ...]
     besides: Task | None = None
 
-    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
+    def error_and_jacobian(self, model: PinocchioModel, q: Array) -> tuple[Array, Array]:
         """Error (reached − wanted) and its Jacobian."""
-        reached, velocities = twin.frames(q, tuple(link for link, _ in self.wanted))
-        missed = pose_errors(reached, np.array([X for _, X in self.wanted]), twin.length).ravel()
-        error, rows = ([], []) if self.besides is None else ([each] for each in self.besides.rows(twin, q))
+        reached, velocities = model.frames(q, tuple(link for link, _ in self.wanted))
+        missed = pose_errors(reached, np.array([X for _, X in self.wanted]), model.length).ravel()
+        error, rows = (
+            ([], []) if self.besides is None else ([each] for each in self.besides.error_and_jacobian(model, q))
+        )
         return np.concatenate([missed, *error]), np.vstack([*velocities, *rows])
 
 
 def solve(
-    twin: PinocchioModel, q: Array, task: Task | None = None, *, tolerance: float = CLOSED, iterations: int = 30
+    model: PinocchioModel, q: Array, task: Task | None = None, *, tolerance: float = CLOSED, iterations: int = 30
 ) -> tuple[Array, float]:
     """The configuration that damped Gauss-Newton reaches from ``q``, and the residual left (loops and task).
 
@@ -158,23 +162,25 @@ def solve(
 
     def advance(q: Array, at: Residual, factor: float) -> Array:
         normal = at.J.T @ at.J
-        normal.reshape(-1)[:: twin.nv + 1] += max(factor * at.size**2, 1e-14)
-        return twin.integrate(q, shorten_step(_damped_step(normal, -(at.J.T @ at.error)), 0.5))
+        normal.reshape(-1)[:: model.nv + 1] += max(factor * at.size**2, 1e-14)
+        return model.integrate(q, shorten_step(_damped_step(normal, -(at.J.T @ at.error)), 0.5))
 
-    q, left = descend(q, lambda q: system(twin, q, task), advance, DAMPING, iterations, lambda at: at.size <= tolerance)
+    q, left = descend(
+        q, lambda q: system(model, q, task), advance, DAMPING, iterations, lambda at: at.size <= tolerance
+    )
     return q, left.size
 
 
 def solve_together(
-    places: Places,
+    places: TaskBatch,
     starts: Sequence[Array],
-    targets: Sequence[Target | None],
+    targets: Sequence[PoseAndValuesTask | None],
     *,
     tolerance: float = CLOSED,
     iterations: int = 30,
 ) -> list[tuple[Array, float]]:
     """As :func:`solve`, from several configurations in step, each to its own target: the same answers."""
-    twin = places.twin
+    model = places.twin
 
     def evaluate(at: Mapping[int, Array]) -> Iterable[tuple[Array, Array]]:
         return places.at(list(at.values()), [targets[i] for i in at])
@@ -184,7 +190,7 @@ def solve_together(
         errors = np.array([at.error for _, at, _ in going.values()])
         normal = J.swapaxes(1, 2) @ J
         damping = [max(factor * at.size**2, 1e-14) for _, at, factor in going.values()]
-        normal.reshape(len(J), -1)[:, :: twin.nv + 1] += np.array(damping)[:, None]
+        normal.reshape(len(J), -1)[:, :: model.nv + 1] += np.array(damping)[:, None]
         wanted = -(J.swapaxes(1, 2) @ errors[:, :, None])
         try:
             steps = np.linalg.solve(normal, wanted)[:, :, 0]
@@ -192,7 +198,7 @@ def solve_together(
             steps = np.array([_damped_step(*each) for each in zip(normal, wanted[:, :, 0], strict=True)])
         longest = np.abs(steps).max(axis=1, initial=0.0).tolist()
         return {
-            i: twin.integrate(q, step if size <= 0.5 else shorten_step(step, 0.5))
+            i: model.integrate(q, step if size <= 0.5 else shorten_step(step, 0.5))
             for (i, (q, _, _)), step, size in zip(going.items(), steps, longest, strict=True)
         }
 
@@ -210,18 +216,18 @@ def _damped_step(normal: Array, wanted: Array) -> Array:
         return np.asarray(np.linalg.lstsq(normal, wanted)[0], dtype=float)
 
 
-class Places:
+class TaskBatch:
     """Errors and Jacobians of the loops and of targets of one kind, at several configurations at once; what is known
     of the places where one target is reached serves the next one too."""
 
-    def __init__(self, twin: PinocchioModel, like: Target | None) -> None:
-        self.twin, self.like = twin, like
+    def __init__(self, model: PinocchioModel, like: PoseAndValuesTask | None) -> None:
+        self.twin, self.like = model, like
         self.links = () if like is None else (like.link,)
         self.observations = () if like is None else tuple(o for o, _ in like.measured)
-        self.plain = all(type(o).apart is Observation.apart for o in self.observations)
+        self.plain = all(type(o).difference is Observation.difference for o in self.observations)
         self.known: dict[int, tuple[Array, tuple[Array, ...], int]] = {}
 
-    def at(self, places: Sequence[Array], targets: Sequence[Target | None]) -> Iterable[tuple[Array, Array]]:
+    def at(self, places: Sequence[Array], targets: Sequence[PoseAndValuesTask | None]) -> Iterable[tuple[Array, Array]]:
         """Error (rows,) and Jacobian (rows, nv) at each configuration, for its target."""
         if all(id(q) in self.known for q in places):
             known = [self.known[id(q)] for q in places]
@@ -233,7 +239,7 @@ class Places:
         goals = [target for target in targets if target is not None]
         if not goals:
             return zip(loops, J, strict=True)
-        missed = Target.misses(goals, X, self.twin.length)
+        missed = PoseAndValuesTask.misses(goals, X, self.twin.length)
         wanted = np.array([goal.wanted for goal in goals])
         if self.plain:
             apart = values - wanted
@@ -254,14 +260,14 @@ class Places:
 
     def _measure(self, places: Sequence[Array]) -> tuple[Array, Array, Array, Array]:
         """The loops' residuals (n, rows), all Jacobians (n, rows, nv), poses X_BP (n, 4, 4), and values (n, size)."""
-        twin, like = self.twin, self.like
-        reference = twin.mechanism.base if like is None else like.reference
-        loops, J, X, V, values, rates = measure_together(twin, places, reference, self.observations, self.links)
+        model, like = self.twin, self.like
+        reference = model.mechanism.base if like is None else like.reference
+        loops, J, X, V, values, rates = measure_together(model, places, reference, self.observations, self.links)
         if like is None:
             return loops, J, X, values
         X, V = X[:, 0], V[:, 0]
         if like.point is not None:
-            V = np.array([point_velocity(v, x[:3, :3] @ like.point / twin.length) for v, x in zip(V, X, strict=True)])
+            V = np.array([point_velocity(v, x[:3, :3] @ like.point / model.length) for v, x in zip(V, X, strict=True)])
         return loops, np.concatenate([J, V, rates], axis=1), X, values
 
 
@@ -271,10 +277,10 @@ def shorten_step(step: Array, longest: float) -> Array:
     return step * (longest / largest) if largest > longest else step
 
 
-def system(twin: PinocchioModel, q: Array, task: Task | None) -> tuple[Array, Array]:
+def system(model: PinocchioModel, q: Array, task: Task | None) -> tuple[Array, Array]:
     """Error and Jacobian of the loops and, below them, of the task."""
-    error, J = twin.residual(q), twin.jacobian(q)
+    error, J = model.residual(q), model.jacobian(q)
     if task is None:
         return error, J
-    extra, rows = task.rows(twin, q)
+    extra, rows = task.error_and_jacobian(model, q)
     return np.concatenate([error, extra]), np.concatenate([J, rows])

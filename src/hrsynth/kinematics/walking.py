@@ -10,7 +10,7 @@ from ..errors import NotSampled
 from ..geometry.ranks import random_in
 from ..geometry.vectors import Array
 from ..tolerances import CLOSED, SOLVED
-from .branch import CORRECTED, follows
+from .branch_tests import CORRECTED, follows
 from .configuration import ClosedConfiguration
 from .tasks import shorten_step, solve
 
@@ -28,20 +28,20 @@ def step_along(
     """The configuration a ``part`` of a step along ``velocity`` leads to; None where it does not close near its
     prediction, or does not follow the branch. ``leaving`` a singular configuration, any branch will do."""
     step = part * shorten_step(STEP * velocity, 3 * STEP)
-    predicted = here.twin.integrate(here.q, step)
-    q, residual = solve(here.twin, predicted, tolerance=SOLVED)
+    predicted = here.model.integrate(here.q, step)
+    q, residual = solve(here.model, predicted, tolerance=SOLVED)
     if not residual <= CLOSED:
         return None
-    there = ClosedConfiguration.of(here.twin, q)
+    there = ClosedConfiguration.of(here.model, q)
     if leaving:
-        apart = float(np.linalg.norm(here.twin.difference(predicted, q)))
+        apart = float(np.linalg.norm(here.model.difference(predicted, q)))
         return there if apart <= float(np.linalg.norm(step)) / 2 else None
     return there if lands_beside(here, step, predicted, there) else None
 
 
 def lands_beside(here: ClosedConfiguration, step: Array, predicted: Array, there: ClosedConfiguration) -> bool:
     """Whether ``there``, where the loops close after a step, is near its prediction and follows the branch."""
-    apart = float(np.linalg.norm(here.twin.difference(predicted, there.q)))
+    apart = float(np.linalg.norm(here.model.difference(predicted, there.q)))
     return apart <= CORRECTED * float(np.linalg.norm(step)) + 1e-9 and follows(here, step, there)
 
 
@@ -60,7 +60,7 @@ def random_walk(
     weakest = WEAKEST * start.kernel()[1].weakest
     given = failed = 0
     while given < count:
-        here, velocity = start, np.zeros(start.twin.nv)
+        here, velocity = start, np.zeros(start.model.nv)
         for _ in range(steps):
             kernel, _ = here.kernel()
             velocity = kernel @ (kernel.T @ (velocity + rng.normal(size=len(kernel)) / 2))
@@ -75,4 +75,4 @@ def random_walk(
             if given == count:
                 return
         if failed > 10 * (given + 10):
-            raise NotSampled(start.twin.mechanism.name, given, count, given + failed)
+            raise NotSampled(start.model.mechanism.name, given, count, given + failed)

@@ -10,7 +10,7 @@ from lxml import etree
 
 from ..description import numerals, xml
 from ..geometry.vectors import Array
-from .subject import LintedFile
+from .linted_file import LintedFile
 
 ENTRIES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 """Where MJCF's six numbers stand in the matrix."""

@@ -10,22 +10,22 @@ from ..records import As
 from ..results import Value
 
 if TYPE_CHECKING:
-    from .subject import LintedFile
+    from .linted_file import LintedFile
 
 SEVERITIES = ("note", "warning", "error")
 """From the mildest to the worst."""
-Mend = Callable[[], None]
+Fix = Callable[[], None]
 """Changes the file's document in place."""
 
 
 @dataclass(frozen=True)
-class Spot:
+class RuleHit:
     """Where a rule found something: the line, what is there, what mends it (None where a person must decide), and the
     advice where it is another than the rule's own."""
 
     line: int | None
     message: str
-    mend: Mend | None = None
+    mend: Fix | None = None
     advice: str | None = None
     severity: str | None = None
 
@@ -40,8 +40,8 @@ class LintRule:
     title: str
     explanation: str
     advice: str
-    find: Callable[[LintedFile], Iterable[Spot]] = field(repr=False)
-    mends: bool = False
+    find: Callable[[LintedFile], Iterable[RuleHit]] = field(repr=False)
+    fixable: bool = False
 
     def __post_init__(self) -> None:
         assert self.severity in SEVERITIES
@@ -57,7 +57,7 @@ class Finding(Value, all_recorded=True):
     line: Annotated[int | None, "null if it concerns the whole file"]
     message: str
     advice: Annotated[str | None, As("fix"), "what to do about it"] = None
-    mends: Annotated[bool, "whether --fix mends it"] = False
+    fixable: Annotated[bool, "whether --fix mends it"] = False
 
     @property
     def rank(self) -> int:

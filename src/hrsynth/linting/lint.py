@@ -14,10 +14,10 @@ from ..description.overrides import Overrides, names
 from ..errors import BadRequest, BadRobotFile, Defect
 from ..records import As, Recorded, Shown, recorded
 from ..results import Result, require_keywords
-from .findings import SEVERITIES, Finding, Mend
+from .findings import SEVERITIES, Finding, Fix
+from .linted_file import LintedFile
 from .rules import lint_rules
 from .rules.readers import PROGRAMS
-from .subject import LintedFile
 
 
 class LintCounts(TypedDict):
@@ -148,7 +148,7 @@ def lint(
     )
 
 
-def findings(file: LintedFile, ignore: Sequence[str] = ()) -> list[tuple[Finding, Mend | None]]:
+def findings(file: LintedFile, ignore: Sequence[str] = ()) -> list[tuple[Finding, Fix | None]]:
     """What the rules find in a file and what mends it, by line, the worst of a line first; what is told by a rule of
     its own is not told again as refused."""
     found = []

@@ -16,8 +16,8 @@ from ..geometry.jets import Jet, turn
 from ..geometry.screws import couple, force
 from ..geometry.so3 import wrap_angle
 from ..geometry.vectors import Array, Numbers, cross, unit
+from .cameras import CameraObservation, FixedValueLocus, ViewGeometry, in_plane, line_plane, stretch
 from .observation import Drawn
-from .sights import CameraObservation, HeldPlace, Sighting, in_plane, line_plane, stretch
 
 HALF_PICTURE = 1.0
 """A line in the image is found by two points this far on each side of the one nearest to the picture's centre: at the
@@ -150,9 +150,9 @@ class SeenLine(CameraObservation):
     angular = True
     rank = 2
     found_by = frozenset({"px"})
-    spot = False
+    images_point = False
 
-    def normal(self, at: Sighting) -> Numbers:
+    def normal(self, at: ViewGeometry) -> Numbers:
         """Of the plane, of any length."""
         raise NotImplementedError
 
@@ -172,11 +172,11 @@ class SeenLine(CameraObservation):
         piece = stretch(cls.meet_plane(p, d, np.array([r])), d, size)
         return Drawn((piece,), (np.vstack([0 * p, piece]),))
 
-    def wrenches(self, at: Sighting) -> list[Numbers]:
+    def wrenches(self, at: ViewGeometry) -> list[Numbers]:
         n = self.normal(at)
         return [force(n, at.B), couple(cross(at.d, n))]
 
-    def loci(self, at: Sighting) -> tuple[HeldPlace, ...]:
+    def loci(self, at: ViewGeometry) -> tuple[FixedValueLocus, ...]:
         return in_plane(at, self.normal(at))
 
     def error(self, value: Array, wanted: Array) -> Array:

@@ -36,7 +36,7 @@ class Leg:
     label: str
     links: tuple[str, ...]
     joints: tuple[str, ...]
-    attach: str
+    platform_link: str
     takes_platform: bool = False
 
     @property
@@ -50,7 +50,7 @@ class Leg:
             return ()
         own = {*self.links, mechanism.base}
         pairs = [
-            (one if one in own else self.attach, other if other in own else self.attach)
+            (one if one in own else self.platform_link, other if other in own else self.platform_link)
             for one, other in (mechanism.joints[name].links for name in self.joints)
         ]
         return tuple(name for k, name in enumerate(self.joints) if not graphs.is_bridge(pairs, k))
@@ -112,7 +112,7 @@ class LegDecomposition(Value):
         """Whether the links on which legs end leave the controlled one a single pose: it is one of them, or hangs on
         links so known by two joints R or P, neither coaxial nor along one direction. Other joints may leave several."""
         mechanism = self.mechanism
-        known, waiting = {mechanism.base, *(leg.attach for leg in self.legs)}, set[str]()
+        known, waiting = {mechanism.base, *(leg.platform_link for leg in self.legs)}, set[str]()
         while waiting != (waiting := set(self.platform) - known):
             known |= {
                 link
@@ -148,8 +148,8 @@ class LegDecomposition(Value):
         mechanism = self.mechanism
         if self.floats(leg):
             return Word((Letter(JointType.FREE.value),))
-        links = {mechanism.base, leg.attach, *leg.links}
-        kept = {mechanism.base, leg.attach}
+        links = {mechanism.base, leg.platform_link, *leg.links}
+        kept = {mechanism.base, leg.platform_link}
         if mechanism.reference not in links:
             hung = [
                 j.relinked(mechanism.reference, mechanism.base)
@@ -160,10 +160,10 @@ class LegDecomposition(Value):
         graph = WordGraph(mechanism, kept, links)
         graph.keep(leg.joints)
         graph.reduce()
-        edges = [edge for _, edge in graph.between(mechanism.base, leg.attach)]
+        edges = [edge for _, edge in graph.between(mechanism.base, leg.platform_link)]
         if len(graph) == 2 and len(edges) == 1:
             return edges[0].word_from(mechanism.base)
-        return _paths_word(graph, mechanism.base, leg.attach)
+        return _paths_word(graph, mechanism.base, leg.platform_link)
 
     def architecture(self) -> Architecture:
         """The legs as a sum of words; a single loop whose legs share their end joint as one word."""
@@ -176,7 +176,7 @@ class LegDecomposition(Value):
     def _loop_word(self, one: Leg, two: Leg) -> Word | None:
         if one.takes_platform or two.takes_platform:
             return self.word(one) + self.word(two).reversed()
-        if self.point is not None and one.attach == two.attach == self.mechanism.platform:
+        if self.point is not None and one.platform_link == two.platform_link == self.mechanism.platform:
             first, second = self.word(one), self.word(two)
             if first.items[-1] == second.items[-1] == Letter("R"):
                 return first + Word(second.items[:-1]).reversed()
@@ -185,10 +185,12 @@ class LegDecomposition(Value):
     def path(self, leg: Leg) -> list[WordEdge]:
         """The shortest chain of edges from the base to the leg's end, composites contracted."""
         mechanism = self.mechanism
-        graph = WordGraph(mechanism, {mechanism.base, leg.attach}, {mechanism.base, leg.attach, *leg.links})
+        graph = WordGraph(
+            mechanism, {mechanism.base, leg.platform_link}, {mechanism.base, leg.platform_link, *leg.links}
+        )
         graph.recognise()
         graph.keep(leg.joints)
-        nodes = graphs.shortest_path(graph.adjacency(), mechanism.base, leg.attach)
+        nodes = graphs.shortest_path(graph.adjacency(), mechanism.base, leg.platform_link)
         return [graph.between(a, b)[0][1] for a, b in pairwise(nodes)]
 
 
@@ -231,7 +233,9 @@ def decompose(mechanism: Mechanism) -> LegDecomposition:
         )
     legs = _segment_platform(mechanism, platform, legs)
     joint_order = {name: i for i, name in enumerate(mechanism.joints)}
-    legs.sort(key=lambda leg: (order[leg.links[0]] if leg.links else order[leg.attach], joint_order[leg.joints[0]]))
+    legs.sort(
+        key=lambda leg: (order[leg.links[0]] if leg.links else order[leg.platform_link], joint_order[leg.joints[0]])
+    )
     return _label_legs(LegDecomposition(mechanism, tuple(sorted(platform, key=order.__getitem__)), tuple(legs)))
 
 
@@ -301,8 +305,8 @@ def _segment_platform(mechanism: Mechanism, platform: set[str], legs: list[Leg])
     """In a single loop with one freedom more on one side, the platform is the last segment of the shorter leg."""
     if len(platform) != 1 or len(legs) != 2 or len(mechanism.joints_of(mechanism.platform)) != 2:
         return legs
-    anatomy = LegDecomposition(mechanism, tuple(platform), tuple(legs))
-    one, two = (_freedoms(anatomy.word(leg)) for leg in legs)
+    decomposition = LegDecomposition(mechanism, tuple(platform), tuple(legs))
+    one, two = (_freedoms(decomposition.word(leg)) for leg in legs)
     if one is None or two is None or abs(one - two) != 1:
         return legs
     short, long = (0, 1) if one < two else (1, 0)
@@ -327,17 +331,19 @@ def _freedoms(word: Word) -> int | None:
     return total
 
 
-def _label_legs(anatomy: LegDecomposition) -> LegDecomposition:
+def _label_legs(decomposition: LegDecomposition) -> LegDecomposition:
     """Labels of the observations where there are any, numbers elsewhere."""
     given: dict[int, str] = {}
     watched: dict[str, Array] = {}
     defects: list[Defect] = []
-    mechanism = anatomy.mechanism
-    links = ", ".join(n for leg in anatomy.legs for n in leg.links) or "none"
+    mechanism = decomposition.mechanism
+    links = ", ".join(n for leg in decomposition.legs for n in leg.links) or "none"
     file = mechanism.file or mechanism.name
     for observation in (o for o in mechanism.observations if o.by_segment):
         line = getattr(observation, "line", None)
-        index = next((i for i, leg in enumerate(anatomy.legs) if anatomy.leg_of(observation.link) == leg), None)
+        index = next(
+            (i for i, leg in enumerate(decomposition.legs) if decomposition.leg_of(observation.link) == leg), None
+        )
         if index is None:
             defects.append(
                 Defect(
@@ -382,7 +388,7 @@ def _label_legs(anatomy: LegDecomposition) -> LegDecomposition:
             )
     if defects:
         raise BadRobotFile(defects)
-    numbers = [str(i + 1) for i in range(len(anatomy.legs))]
+    numbers = [str(i + 1) for i in range(len(decomposition.legs))]
     free = [n for n in numbers if n not in given.values()]
     labels: list[str] = []
     for i, number in enumerate(numbers):
@@ -394,5 +400,6 @@ def _label_legs(anatomy: LegDecomposition) -> LegDecomposition:
         else:
             labels.append(free.pop(0))
     return replace(
-        anatomy, legs=tuple(replace(leg, label=label) for leg, label in zip(anatomy.legs, labels, strict=True))
+        decomposition,
+        legs=tuple(replace(leg, label=label) for leg, label in zip(decomposition.legs, labels, strict=True)),
     )

@@ -18,10 +18,10 @@ from ..errors import BadMechanism, BadRequest, NoPlatform
 from ..geometry.vectors import Array, frozen, inverse, unit
 from ..results import Result, Value, content
 from ..tolerances import NO_SPREAD, SAME_GEOMETRY
+from .cameras import NamedCamera
 from .graphs import Adjacency, adjacency, component, spanning_forest
 from .observation import Observation
-from .sights import NamedCamera
-from .wrist import Wrist
+from .tilt_limit import TiltLimit
 
 
 class JointType(StrEnum):
@@ -62,7 +62,7 @@ class Limits:
     effort: float | None = None
 
 
-class Stop(NamedTuple):
+class JointRange(NamedTuple):
     """From where to where (m, rad) a joint's coordinate goes, infinite if there is no limit, and which one it is."""
 
     joint: str
@@ -116,7 +116,7 @@ class Joint(Value):
     """Whether a file writes it as a tree joint (else as a loop)."""
     xml: tuple[str, ...] = ()
     line: int | None = field(default=None, compare=False)
-    wrist: Wrist | None = None
+    wrist: TiltLimit | None = None
     """The turns of a spherical joint that stands for several R, where they are limited or of three R (normal form)."""
     turns: tuple[tuple[str, Limits | None], ...] = ()
     """Names and limits of the two R that a U stands for, in the order of its axes (normal form)."""
@@ -400,7 +400,7 @@ class Mechanism(Result, shown_as="robot"):
         raise BadMechanism(f"coupling {coupling.name!r}: no single joint carries the link", link)
 
     @cached_property
-    def limited(self) -> dict[str, tuple[float, float]]:
+    def joint_ranges(self) -> dict[str, tuple[float, float]]:
         """The joints whose coordinates are limited: lower and upper limit (m, rad), infinite if there is none."""
         return {
             name: (lower, upper)
@@ -409,7 +409,7 @@ class Mechanism(Result, shown_as="robot"):
         }
 
     @cached_property
-    def stops(self) -> dict[str, Stop]:
+    def stops(self) -> dict[str, JointRange]:
         """The same, and each R with limits that is joined with another into a U."""
         given = {
             name: (joint.name, place, limits.lower, limits.upper)
@@ -418,16 +418,16 @@ class Mechanism(Result, shown_as="robot"):
             if limits is not None and (limits.lower, limits.upper) != (None, None)
         }
         return {
-            name: Stop(joint, place, -np.inf if lower is None else lower, np.inf if upper is None else upper)
+            name: JointRange(joint, place, -np.inf if lower is None else lower, np.inf if upper is None else upper)
             for name, (joint, place, lower, upper) in given.items()
         }
 
     @cached_property
     def filed(self) -> dict[str, tuple[float, float]]:
-        """The same as :attr:`limited`, as the file counts."""
+        """The same as :attr:`joint_ranges`, as the file counts."""
         return {
             name: (_counted(lower, self.joints[name]), _counted(upper, self.joints[name]))
-            for name, (lower, upper) in self.limited.items()
+            for name, (lower, upper) in self.joint_ranges.items()
         }
 
     @cached_property
@@ -439,7 +439,7 @@ class Mechanism(Result, shown_as="robot"):
         return tuple(joint.name for joint in joints if joint.name not in tree and joint.type is JointType.FREE)
 
     @cached_property
-    def wrists(self) -> dict[str, Wrist]:
+    def tilt_limits(self) -> dict[str, TiltLimit]:
         """The spherical joints that cannot make every turn."""
         return {
             name: joint.wrist for name, joint in self.joints.items() if joint.wrist is not None and joint.wrist.limits

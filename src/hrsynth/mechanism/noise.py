@@ -13,8 +13,8 @@ from ..errors import BadRequest
 from ..geometry.vectors import Array
 from ..options import plain_number
 from ..tolerances import NOISE_STEP
+from .cameras import CameraObservation
 from .observation import Observation
-from .sights import CameraObservation
 
 EXAMPLE = "0.1deg or 0.002 (radians), 0.3px in a picture, 1mm of lengths; several with commas"
 UNITS = {"px": ("px", 1.0), "deg": ("rad", math.radians(1)), "mm": ("m", 1e-3), "m": ("m", 1.0), "": ("rad", 1.0)}

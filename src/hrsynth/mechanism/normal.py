@@ -22,7 +22,7 @@ from ..results import Value, with_value
 from ..tolerances import SAME_POINT
 from . import graphs
 from .model import Joint, JointType, Limits, Mechanism
-from .wrist import Interval, Wrist, chain_arcs
+from .tilt_limit import Interval, TiltLimit, chain_arcs
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -182,7 +182,7 @@ def _join(
     type: JointType | None = None,
     point: Array | None = None,
     axes: tuple[Array, ...] = (),
-    wrist: Wrist | None = None,
+    wrist: TiltLimit | None = None,
     turns: tuple[tuple[str, Limits | None], ...] = (),
 ) -> Joint:
     """One joint from a's predecessor to b's successor, without limits of its own: of a's type and place where none is
@@ -203,7 +203,7 @@ def _join(
     )
 
 
-def _wrist(*joints: Joint) -> Wrist | None:
+def _wrist(*joints: Joint) -> TiltLimit | None:
     """What turns several joints about one centre, one after the other, cannot make together."""
     ends: tuple[Array, Array] | None = None
     span: Interval = 0.0, 0.0
@@ -220,7 +220,7 @@ def _wrist(*joints: Joint) -> Wrist | None:
         span = own if ends is None else chain_arcs(span, angle_between(ends[1], first), own)
         ends = (first if ends is None else ends[0]), last
         count += len(joint.axes)
-    return None if ends is None else Wrist.of(*ends, span, count)
+    return None if ends is None else TiltLimit.of(*ends, span, count)
 
 
 def _triple(mechanism: Mechanism, a: Joint, b: Joint, c: Joint) -> Joint | None:

@@ -60,7 +60,7 @@ class Observation(Value):
 
     angular: ClassVar[bool] = False
     """Whether its errors are angles: unit vectors and turns."""
-    fed_back: ClassVar[str] = "y − y*"
+    feature_error: ClassVar[str] = "y − y*"
     """The error that a servo loop drives to zero, for the table of all kinds."""
     found_by: ClassVar[frozenset[str]] = frozenset()
     """Units of the noise that its simulated sensor has: ``px``, ``m``, ``rad``."""
@@ -89,13 +89,13 @@ class Observation(Value):
         """The rate of :meth:`value` for each joint velocity; one row a component."""
         raise NotImplementedError
 
-    def apart(self, value: Array, wanted: Array) -> Array:
+    def difference(self, value: Array, wanted: Array) -> Array:
         """By how much a measured value is off a wanted one."""
         return value - wanted
 
     def error(self, value: Array, wanted: Array) -> Array:
         """What a servo loop drives to zero (rows,), of a value (size,): by default y − y*."""
-        return self.apart(value, wanted)
+        return self.difference(value, wanted)
 
     def error_slope(self, value: Array, wanted: Array) -> Array:
         """∂error/∂value, (rows, size). Errors change their sign where value and wanted value change places, so
@@ -130,7 +130,7 @@ class Observation(Value):
         return np.concatenate(values), np.concatenate(rates)
 
     @classmethod
-    def abreast(
+    def batched(
         cls, observations: Sequence[Observation], X_reference: Array, X_links: Array, V_reference: Array, V_links: Array
     ) -> tuple[Array, Array]:
         """The same at several configurations, poses (n, 4, 4) and (n, k, 4, 4): (n, rows), (n, rows, columns)."""

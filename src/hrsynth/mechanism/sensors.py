@@ -27,27 +27,27 @@ INSTEAD = "another direction: --see direction:LINK/dx,dy,dz (in the link's frame
 TURNING = (JointType.REVOLUTE, JointType.CYLINDRICAL)
 
 
-def default_observation(anatomy: LegDecomposition, leg: Leg, last: bool = False) -> Direction:
+def default_observation(decomposition: LegDecomposition, leg: Leg, last: bool = False) -> Direction:
     """The default segment of a leg (docs/pages/theory.md, section 2): the axis of a P that joins two moving links;
     else the last segment before the platform (of equal parallel rods the first) that has a length; with ``last`` the
     last one, and ``NoSegment`` where it has none."""
-    return _default(anatomy, leg, last)[0]
+    return _default(decomposition, leg, last)[0]
 
 
-def _default(anatomy: LegDecomposition, leg: Leg, last: bool = False) -> tuple[Direction, str]:
+def _default(decomposition: LegDecomposition, leg: Leg, last: bool = False) -> tuple[Direction, str]:
     """The default segment of a leg, and why it is that one."""
-    if anatomy.floats(leg):
+    if decomposition.floats(leg):
         raise NoSegment(
             f"leg {leg.label} has no segment to observe: nothing holds the platform", leg.joints[0], INSTEAD
         )
-    segments = _Segments(anatomy, leg, NOISE)
-    path, nodes, base = segments.path, segments.nodes, anatomy.mechanism.base
+    segments = _Segments(decomposition, leg, NOISE)
+    path, nodes, base = segments.path, segments.nodes, decomposition.mechanism.base
     for i, edge in enumerate(path):
         joint = segments.joint(edge)
         if joint is not None and joint.type is JointType.PRISMATIC and base not in (nodes[i], nodes[i + 1]):
             return segments.along(nodes[i], joint, i), f"the axis of the slide {joint.name}"
     if leg.takes_platform:
-        return segments.binary(anatomy.mechanism.platform), "the platform is the last segment of this leg"
+        return segments.binary(decomposition.mechanism.platform), "the platform is the last segment of this leg"
     if path[-1].inside:
         rod = _first(segments.binary, path[-1].inside)
         return rod, "the first of the parallel rods before the platform"
@@ -71,50 +71,52 @@ def _first(segment: Callable[[Place], Direction], places: Sequence[Place]) -> Di
     raise refused
 
 
-def reason(anatomy: LegDecomposition, seen: Observation) -> str:
+def reason(decomposition: LegDecomposition, seen: Observation) -> str:
     """Why a segment is watched, in words."""
-    if any(each.key == seen.key for each in anatomy.mechanism.observations):
+    if any(each.key == seen.key for each in decomposition.mechanism.observations):
         return "named in the file" if seen.by_segment or seen.line is not None else "asked for"
     try:
-        default, why = _default(anatomy, anatomy.leg(seen.leg))
+        default, why = _default(decomposition, decomposition.leg(seen.leg))
     except HrsynthError:
         return "asked for"
     return why if default.key == seen.key else "asked for"
 
 
-def defaults_of(anatomy: LegDecomposition) -> dict[str, Observation]:
+def defaults_of(decomposition: LegDecomposition) -> dict[str, Observation]:
     """The segment of each leg that has one: the file's choice, else the default one."""
     table: dict[str, Observation] = {}
-    given = {o.leg: o for o in reversed(anatomy.mechanism.observations) if o.by_segment}
-    for leg in anatomy.legs:
+    given = {o.leg: o for o in reversed(decomposition.mechanism.observations) if o.by_segment}
+    for leg in decomposition.legs:
         if leg.label in given:
             table[leg.label] = given[leg.label]
             continue
         try:
-            table[leg.label] = default_observation(anatomy, leg)
+            table[leg.label] = default_observation(decomposition, leg)
         except HrsynthError:
             continue
     return table
 
 
-def observation_of(anatomy: LegDecomposition, link: str) -> Direction:
+def observation_of(decomposition: LegDecomposition, link: str) -> Direction:
     """The segment direction of any link of a leg: centre to centre, or along the axis of its P."""
-    leg = anatomy.leg_of(link)
+    leg = decomposition.leg_of(link)
     if leg is None:
         raise BadRequest(
-            f"{anatomy.mechanism.name}: no leg has the link", link, [n for each in anatomy.legs for n in each.links]
+            f"{decomposition.mechanism.name}: no leg has the link",
+            link,
+            [n for each in decomposition.legs for n in each.links],
         )
-    segments = _Segments(anatomy, leg)
+    segments = _Segments(decomposition, leg)
     return segments.at(segments.nodes.index(link)) if link in segments.nodes[1:-1] else segments.binary(link)
 
 
 class _Segments:
     """The directions of a leg's segments: links on its ``path``, between ``nodes``."""
 
-    def __init__(self, anatomy: LegDecomposition, leg: Leg, least: float = SAME_POINT) -> None:
+    def __init__(self, decomposition: LegDecomposition, leg: Leg, least: float = SAME_POINT) -> None:
         """``least`` is the length (characteristic lengths) up to which a segment has none."""
         self.least = least
-        self.mechanism, self.leg, self.path = anatomy.mechanism, leg, anatomy.path(leg)
+        self.mechanism, self.leg, self.path = decomposition.mechanism, leg, decomposition.path(leg)
         self.nodes = [self.mechanism.base]
         for edge in self.path:
             self.nodes.append(edge.other(self.nodes[-1]))
@@ -170,7 +172,7 @@ class _Segments:
         after = (
             joints[self.path[place + 1].joints[0]].point
             if place < last
-            else self.mechanism.links[self.leg.attach].pose[:3, 3]
+            else self.mechanism.links[self.leg.platform_link].pose[:3, 3]
         )
         backwards = float(joint.axis @ (after - before)) < -SAME_POINT * self.mechanism.length
         return self._direction(link, -joint.axis if backwards else joint.axis)
@@ -242,10 +244,10 @@ def _slide(mechanism: Mechanism, joint: Joint, leg: str) -> SlideEncoder:
     )
 
 
-def observed_line(anatomy: LegDecomposition, seen: Direction) -> SpaceLine:
+def observed_line(decomposition: LegDecomposition, seen: Direction) -> SpaceLine:
     """The line whose direction is ``seen``: the one through the segment's first centre (that of a joint that does not
     slide, where there is one; docs/pages/theory.md, section 2)."""
-    mechanism = anatomy.mechanism
+    mechanism = decomposition.mechanism
     link = mechanism.links[seen.link]
     joints = sorted(mechanism.joints_of(seen.link), key=lambda joint: joint.type.slides)
     centre = centre_pair(*joints)[0] if len(joints) == 2 else joints[0].point

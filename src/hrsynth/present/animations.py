@@ -13,12 +13,12 @@ import numpy as np
 from ..analysis.observed import ObservedRobot
 from ..errors import BadRequest
 from ..geometry.vectors import Array, inverse
-from ..progress import tell
+from ..progress import report
 from ..simulation.camera import Camera, Cylinder, cylinders, facing, rods_in_frame
-from ..simulation.mockup import rods as rods_of
-from ..simulation.pictures import GREY, LegRenderer
+from ..simulation.crossings import TYPE_2
+from ..simulation.mujoco_model import rods as rods_of
+from ..simulation.rendered_images import GREY, LegRenderer
 from ..simulation.result import Servo
-from ..simulation.track import TYPE_2
 from ..tolerances import REST_OF_RUN
 from . import palette
 from .plots import empty_figure, in_style, pose_words
@@ -51,19 +51,19 @@ def animation(found: Servo) -> bytes:
     """The run as GIF, at equal parts of its way; raises ``MissingExtra``, ``NotRendered``."""
     from PIL import Image
 
-    setting, configurations = found.setting, found.run.configurations
-    require_legs(setting)
-    question = setting.samples.question
+    setup, configurations = found.setup, found.run.configurations
+    require_legs(setup)
+    question = setup.samples.observation_model
     stage = LegRenderer(
-        setting.mechanism, _camera(found), question.reference, cylinders(setting.mechanism, question.observations)
+        setup.mechanism, _camera(found), question.reference, cylinders(setup.mechanism, question.observations)
     )
     wanted = _lit(stage.picture(found.target.pose))
     paper = np.where(_bare(wanted)[..., None], 1.0, 1.0 - WANTED * (1.0 - wanted))
     sheet = Sheet(found)
     frames = []
-    moments = _moments(np.array([at.pose(setting.motion.link)[:3, 3] for at in configurations]), found.errors)
+    moments = _moments(np.array([at.pose(setup.motion.link)[:3, 3] for at in configurations]), found.errors)
     for number, words in zip(moments, captions(found, moments), strict=True):
-        tell("frames")
+        report("frames")
         seen = _lit(stage.picture(configurations[number].pose))
         frame = sheet.at(number, words)
         frame[:, : seen.shape[1]] = 255 * np.where(_bare(seen)[..., None], paper, seen)
@@ -81,12 +81,12 @@ def animation(found: Servo) -> bytes:
     return stream.getvalue()
 
 
-def require_legs(setting: ObservedRobot, **_: Any) -> None:
+def require_legs(setup: ObservedRobot, **_: Any) -> None:
     """Raise ``BadRequest`` where something else is observed than legs."""
-    for each in setting.observed:
+    for each in setup.observed:
         if not each.by_segment:
             raise BadRequest(
-                f"{setting.robot.name}: an animation draws the legs that are watched",
+                f"{setup.robot.name}: an animation draws the legs that are watched",
                 f"{each.kind} {each.leg}",
                 "a picture (.png, .pdf, .svg), which draws all kinds",
             )
@@ -104,7 +104,7 @@ def captions(found: Servo, moments: list[int]) -> Iterator[str]:
             yield "The start. Pale: where the watched legs should be. Bright: where they are."
         elif k == len(moments) - 1:
             turned = f" and {np.degrees(radians):.2g}°" if np.degrees(radians) > LEAST_TURN else ""
-            yield f"The end: {ENDS[found.ended]}. The platform is {1e3 * metres:.3g} mm{turned} from the goal."
+            yield f"The end: {ENDS[found.outcome]}. The platform is {1e3 * metres:.3g} mm{turned} from the goal."
         elif passed:
             yield (
                 "A singularity is crossed: for a moment the legs do not show how the platform moves."
@@ -124,11 +124,11 @@ class Sheet:
         self.times = found.run.times
         figure = self.figure = empty_figure(WIDTH / DOTS, HEIGHT / DOTS, dpi=DOTS)
         left, wide = (WIDTH - SIDE + 30) / WIDTH, (SIDE - 60) / WIDTH
-        figure.text(left, 0.945, found.setting.robot.name, fontsize=17, fontweight="bold", va="center")
+        figure.text(left, 0.945, found.setup.robot.name, fontsize=17, fontweight="bold", va="center")
         figure.text(left, 0.895, f"from {pose_words(found.start)}\nto {pose_words(found.goal)}", fontsize=9, va="top")
         self.words = figure.text(left, 0.79, "", fontsize=14, va="top", linespacing=1.35)
         figure.text(left, 0.53, "■", fontsize=11, va="center", color=palette.colour("watched"))
-        figure.text(left + 0.016, 0.53, name_all("leg", found.setting.labels), fontsize=10, va="center")
+        figure.text(left + 0.016, 0.53, name_all("leg", found.setup.labels), fontsize=10, va="center")
         self.marks: list[Any] = []
         for bottom, values, label in (
             (0.29, found.errors.max(axis=1), "largest error of a direction"),
@@ -152,7 +152,7 @@ class Sheet:
 
 def _camera(found: Servo) -> Camera:
     """A camera that has the whole robot in its picture at both ends of the run, from above its side."""
-    mechanism, reference = found.setting.mechanism, found.setting.samples.question.reference
+    mechanism, reference = found.setup.mechanism, found.setup.samples.observation_model.reference
     links = []
     for link in set(mechanism.links) - {mechanism.base}:
         X = inverse(mechanism.links[link].pose)

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from ..geometry.vectors import Array
-from ..simulation.ending import ANTIPODAL, BOUNDARY, GOAL, MINIMUM, MODE, SIGHT, TIME, UNDECIDED
-from ..simulation.endings.basins import LETTERS, NOT_REACHED, BasinEnd, Basins, place_of
-from ..simulation.endings.flow import Flags, Places
+from ..simulation.equilibria.basins import LETTERS, NOT_REACHED, BasinEnd, Basins, place_of
+from ..simulation.equilibria.flow import Flags, Places
+from ..simulation.outcome import ANTIPODAL, BOUNDARY, GOAL, MINIMUM, MODE, SIGHT, TIME, UNDECIDED
 from ..tolerances import IN_PLANE
 from . import palette, plots
+from .figure_format import PNG, Paper, print_figure
 from .palette import SERIES
-from .paper import PNG, Paper, print_figure
 from .plots import (
     MapPlane,
     cell_edges,
@@ -62,8 +62,10 @@ DAMPED: dict[str, Any] = {"facecolor": "none", "edgecolor": "0.25", "hatch": "..
 
 def colours(ends: tuple[BasinEnd, ...]) -> list[str]:
     """A colour an end: one hue a kind, no two the same."""
-    shades = {kind: iter(_shades(kind, count)) for kind, count in Counter(each.ending.name for each in ends).items()}
-    return [next(shades[each.ending.name]) for each in ends]
+    shades = {
+        kind: iter(_shades(kind, count)) for kind, count in Counter(each.run_outcome.name for each in ends).items()
+    }
+    return [next(shades[each.run_outcome.name]) for each in ends]
 
 
 def _shades(kind: str, count: int) -> list[str]:
@@ -115,7 +117,7 @@ def picture(found: Basins, paper: Paper = PNG) -> bytes:
         entries.append(Patch(label="the run comes to a singularity", **DAMPED))
     if (found.cells == NOT_REACHED).any():
         entries.append(missing_entry())
-    kinds = dict.fromkeys(each.ending.name for each in found.ends)
+    kinds = dict.fromkeys(each.run_outcome.name for each in found.ends)
     entries += [
         entry(ENDS[kind], linestyle="", marker=MARKS[kind], color="black")
         for kind in kinds
@@ -127,12 +129,12 @@ def picture(found: Basins, paper: Paper = PNG) -> bytes:
             entry(f"hollow: at another {others}", linestyle="", marker="o", markerfacecolor="none", color="black")
         )
     if grid.ndim > 1:
-        entries += MapPlane.of(grid.axes, found.setting.motion, 0.4, 1.6).robot(figure, found.setting.everything.start)
+        entries += MapPlane.of(grid.axes, found.setup.motion, 0.4, 1.6).robot(figure, found.setup.all_samples.start)
     plots.legend(figure, entries, paper)
-    word = "legs " if all(each.by_segment for each in found.setting.observed) else ""
+    word = "legs " if all(each.by_segment for each in found.setup.observed) else ""
     heading(
         figure,
-        f"{found.setting.robot.name}, {word}{', '.join(found.setting.labels)} observed: where each start "
+        f"{found.setup.robot.name}, {word}{', '.join(found.setup.labels)} observed: where each start "
         f"ends\ngoal {plots.pose_words(found.goal)}",
         grid.fixed,
         "; starts: ",
@@ -141,8 +143,8 @@ def picture(found: Basins, paper: Paper = PNG) -> bytes:
 
 
 def _describe_end(letter: str, end: BasinEnd) -> str:
-    matched = f" {end.ending.matched}" if end.ending.matched else ""
-    return f"{letter}  {end.ending.name}{matched}: {100 * end.share:.3g} %"
+    matched = f" {end.run_outcome.matched}" if end.run_outcome.matched else ""
+    return f"{letter}  {end.run_outcome.name}{matched}: {100 * end.share:.3g} %"
 
 
 def _strip(found: Basins, paper: Paper) -> tuple[Any, list[Any]]:
@@ -159,13 +161,13 @@ def _ends_on_line(place: Any, found: Basins) -> set[tuple[str, bool]]:
     (name,) = found.grid.names
     (low, high), drawn = place.get_xlim(), set()
     for letter, each in zip(LETTERS, found.ends, strict=False):
-        here = None if each.X is None else float(tick_values(name, place_of(found.setting.motion, each.X, (name,)))[0])
+        here = None if each.X is None else float(tick_values(name, place_of(found.setup.motion, each.X, (name,)))[0])
         if here is not None and low <= here <= high:
             inside = _inside(found, each, None)
             place.plot(
                 here,
                 0.5,
-                MARKS[each.ending.name],
+                MARKS[each.run_outcome.name],
                 markeredgecolor="black",
                 markersize=11,
                 clip_on=False,
@@ -174,13 +176,13 @@ def _ends_on_line(place: Any, found: Basins) -> set[tuple[str, bool]]:
             place.annotate(
                 letter, (here, 0.5), (0, 13), textcoords="offset points", ha="center", path_effects=outline_strokes()
             )
-            drawn.add((each.ending.name, inside))
+            drawn.add((each.run_outcome.name, inside))
     return drawn
 
 
 def _maps(found: Basins, paper: Paper) -> tuple[Any, list[Any]]:
     """The figure of a plane or a box, and its layers: axes, plane, cells, which are damped, value of the third part."""
-    made = PoseMap.of(found.grid, found.setting.motion, paper)
+    made = PoseMap.of(found.grid, found.setup.motion, paper)
     layers = [
         (place, made.plane, cells, damped, level)
         for (place, cells), (_, damped), level in zip(
@@ -256,8 +258,8 @@ def _inside(found: Basins, end: BasinEnd, level: float | None) -> bool:
     """Whether an end is one of the poses of a plane or line; ``level`` is the third part's value of one of a box."""
     assert end.X is not None
     held = _shared_parts(found, level)
-    away = np.abs(place_of(found.setting.motion, end.X, tuple(held)) - np.array(list(held.values())))
-    return bool(np.all(away <= IN_PLANE * found.target.twin.length))
+    away = np.abs(place_of(found.setup.motion, end.X, tuple(held)) - np.array(list(held.values())))
+    return bool(np.all(away <= IN_PLANE * found.target.model.length))
 
 
 def _shared_parts(found: Basins, level: float | None) -> dict[str, float]:
@@ -275,7 +277,7 @@ def outline_strokes() -> list[Any]:
 
 def _ends(place: Any, plane: MapPlane, found: Basins, level: float | None) -> set[tuple[str, bool]]:
     """The ends where they lie, those of the plane filled: which kinds are drawn, and whether as one of the plane."""
-    motion, drawn = found.setting.motion, set()
+    motion, drawn = found.setup.motion, set()
     spots: list[tuple[float, float, str]] = []
     for letter, each in zip(LETTERS, found.ends, strict=False):
         if each.X is None:
@@ -289,15 +291,15 @@ def _ends(place: Any, plane: MapPlane, found: Basins, level: float | None) -> se
         place.plot(
             u,
             v,
-            MARKS[each.ending.name],
-            markersize=14 if each.ending.name == GOAL else 8,
+            MARKS[each.run_outcome.name],
+            markersize=14 if each.run_outcome.name == GOAL else 8,
             zorder=5,
             markerfacecolor="black" if inside else "none",
             markeredgecolor="black",
             markeredgewidth=1.2,
         )
         spots.append((float(u[0]), float(v[0]), letter))
-        drawn.add((each.ending.name, inside))
+        drawn.add((each.run_outcome.name, inside))
     points = place.get_window_extent().width * 72 / place.figure.dpi
     wide = np.ptp(plane.at(cell_edges(plane.x), plane.y[0])[0])
     marks = np.array([spot[:2] for spot in spots]).reshape(-1, 2) * points / wide
@@ -336,6 +338,6 @@ def table(found: Basins) -> bytes:
     rows: list[list[Any]] = [[*found.grid.names, "end", "ended", "damped"]]
     places, marks = found.grid.places().tolist(), found.damped.ravel()
     for place, cell, damped in zip(places, found.cells.ravel(), marks, strict=True):
-        told = ["", "", ""] if cell == NOT_REACHED else [LETTERS[cell], found.ends[cell].ending.name, int(damped)]
+        told = ["", "", ""] if cell == NOT_REACHED else [LETTERS[cell], found.ends[cell].run_outcome.name, int(damped)]
         rows.append([*map(repr, place), *told])
     return csv_bytes(rows)

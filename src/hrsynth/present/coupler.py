@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..analysis.modes.curves import Circle, Curve, Line, Point
+from ..analysis.modes.loci import Circle, Curve, Line, Point
 from ..geometry.vectors import Array, perpendicular, unit
 
 STEPS = 1440

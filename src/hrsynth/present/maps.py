@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis.check import MEASURES, UNREACHABLE
-from ..analysis.posture import CONSTRAINT, UNDECIDED
+from ..analysis.configuration_report import CONSTRAINT, UNDECIDED
 from ..analysis.singularity.locus import Locus
 from ..errors import BadRequest
 from ..geometry.vectors import Array
 from ..mechanism.pose import PARTS
 from ..tolerances import DARKEST_DISTANCE, DISTANCE_FLOOR
 from . import palette, plots
-from .paper import PNG, Paper, print_figure
+from .figure_format import PNG, Paper, print_figure
 from .plots import (
     MapPlane,
     along,
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from ..analysis.check import Check, GridCheck
     from ..analysis.observed import ObservedRobot
     from ..analysis.singularity.locus import SingularityMap
-    from ..analysis.singularity.singular import Singularity
+    from ..analysis.singularity.singularities import Singularity
     from ..kinematics.platform_motion import PlatformMotion
     from ..mechanism.pose import Grid, Pose
 
@@ -72,7 +72,7 @@ def distance_map(found: Check, paper: Paper = PNG) -> bytes:
     assert grid is not None
     if all(value is None for value in grid.values("type2")):
         raise BadRequest(
-            f"{found.setting.robot.name}: there is nothing to draw: Mᵀ exists nowhere",
+            f"{found.setup.robot.name}: there is nothing to draw: Mᵀ exists nowhere",
             None,
             "another grid, or a table (.csv)",
         )
@@ -81,10 +81,10 @@ def distance_map(found: Check, paper: Paper = PNG) -> bytes:
     figure = (
         _distance_curve(grid, numbers, states, paper)
         if grid.grid.ndim == 1
-        else _distance_maps(grid, numbers, states, found.setting.motion, paper)
+        else _distance_maps(grid, numbers, states, found.setup.motion, paper)
     )
     entries = [missing_entry()] if UNREACHABLE in grid.states else []
-    entries += _robot(figure, grid.grid, found.setting)
+    entries += _robot(figure, grid.grid, found.setup)
     entries += [
         entry(label, linestyle="", marker=mark, color=palette.colour("step4"), markeredgecolor="white")
         for state, (mark, label) in MARKS.items()
@@ -93,19 +93,16 @@ def distance_map(found: Check, paper: Paper = PNG) -> bytes:
     plots.legend(figure, entries, paper)
     heading(
         figure,
-        f"{found.setting.robot.name}: distance to Type 2 singularities, legs "
-        f"{', '.join(found.setting.labels)} observed",
+        f"{found.setup.robot.name}: distance to Type 2 singularities, legs {', '.join(found.setup.labels)} observed",
         grid.grid.fixed,
     )
     return print_figure(figure, paper)
 
 
-def _robot(figure: Any, grid: Grid, setting: ObservedRobot) -> list[Any]:
+def _robot(figure: Any, grid: Grid, setup: ObservedRobot) -> list[Any]:
     """Draw the robot in the maps of a grid; its entry in the legend."""
     return (
-        []
-        if grid.ndim == 1
-        else MapPlane.of(grid.axes, setting.motion, 0.3, 2.0).robot(figure, setting.everything.start)
+        [] if grid.ndim == 1 else MapPlane.of(grid.axes, setup.motion, 0.3, 2.0).robot(figure, setup.all_samples.start)
     )
 
 
@@ -187,18 +184,18 @@ def check_table(found: Check) -> bytes:
     return csv_bytes(rows)
 
 
-def require_plane(setting: ObservedRobot, plane: Pose | str | None = None, **_: Any) -> None:
+def require_plane(setup: ObservedRobot, plane: Pose | str | None = None, **_: Any) -> None:
     """Raise what is wrong with the plane, or why there is no locus."""
     from ..analysis.singularity.locus import require_plane
 
-    require_plane(setting, plane)
+    require_plane(setup, plane)
 
 
 def locus(found: Singularity, plane: Pose | str | None, steps: int, seed: int) -> Locus:
     """Where a freedom is lost over a plane of poses."""
     from ..analysis.singularity.locus import locus
 
-    return locus(found.setting, plane=plane, steps=steps, seed=seed)
+    return locus(found.setup, plane=plane, steps=steps, seed=seed)
 
 
 @in_style
@@ -206,7 +203,7 @@ def locus_map(found: Singularity, drawn: Locus, paper: Paper = PNG) -> bytes:
     """Type 2 loci of the hidden and the real robot over a plane, the Type 1 boundary and what is not reached (PNG)."""
     from matplotlib.patches import Patch
 
-    plane = MapPlane.of(drawn.grid.axes, found.setting.motion, 0.4, 1.6)
+    plane = MapPlane.of(drawn.grid.axes, found.setup.motion, 0.4, 1.6)
     figure, (place,) = panels(1, 1, 7.2, 6.0 * plane.tall + 1.6, paper)
     shade = np.log10(np.maximum(drawn.hidden.type2, DARKEST_DISTANCE))
     plane.cells(
@@ -225,11 +222,11 @@ def locus_map(found: Singularity, drawn: Locus, paper: Paper = PNG) -> bytes:
     entries += [Patch(facecolor="0.5", label="darker: nearer to Type 2"), *borders]
     if not np.isfinite(drawn.hidden.type2).all():
         entries.append(missing_entry())
-    entries += plane.robot(figure, found.setting.everything.start)
+    entries += plane.robot(figure, found.setup.all_samples.start)
     plots.legend(figure, entries, paper)
     heading(
         figure,
-        f"{found.setting.robot.name}: Type 2 singularities, legs {', '.join(found.setting.labels)} observed",
+        f"{found.setup.robot.name}: Type 2 singularities, legs {', '.join(found.setup.labels)} observed",
         drawn.grid.fixed,
     )
     return print_figure(figure, paper)
@@ -290,12 +287,12 @@ def error_map(found: Accuracy, paper: Paper = PNG) -> bytes:
     figure, locus = (
         _error_curves(field, shown, paper)
         if field.grid.ndim == 1
-        else _error_maps(field, shown, found.setting.motion, paper)
+        else _error_maps(field, shown, found.setup.motion, paper)
     )
-    plots.legend(figure, _error_entries(field, locus) + _robot(figure, field.grid, found.setting), paper)
-    legs = ", ".join(f"{o.leg} {found.blur.words(i, o)}" for i, o in enumerate(found.setting.observed))
-    what = "observed legs" if all(o.by_segment for o in found.setting.observed) else "observed"
-    heading(figure, f"{found.setting.robot.name}: largest errors\n{what}: {legs}", field.grid.fixed, "; ")
+    plots.legend(figure, _error_entries(field, locus) + _robot(figure, field.grid, found.setup), paper)
+    legs = ", ".join(f"{o.leg} {found.bounds.words(i, o)}" for i, o in enumerate(found.setup.observed))
+    what = "observed legs" if all(o.by_segment for o in found.setup.observed) else "observed"
+    heading(figure, f"{found.setup.robot.name}: largest errors\n{what}: {legs}", field.grid.fixed, "; ")
     return print_figure(figure, paper)
 
 

@@ -13,7 +13,7 @@ from ..analysis.modes.modes import AssemblyModes
 from ..errors import BadRequest
 from ..geometry.vectors import Array
 from . import palette
-from .paper import PNG, Paper, legend_within, print_figure, settle_title, wrap
+from .figure_format import PNG, Paper, legend_within, print_figure, settle_title, wrap
 from .plots import empty_figure, entry, in_style
 from .scenes import CLOSES, GOAL, NEAR, OPEN, UNKNOWN, ModesScene, Placed, scene
 from .sketch import Box, Sketch
@@ -74,8 +74,8 @@ def why_undrawn(found: AssemblyModes) -> str | None:
     """Why there is nothing to draw: a formation, a continuum of modes, or none at all."""
     if found.formation is not None:
         return "a formation has no platform on which to draw the ends of legs"
-    if found.found.continuum is not None or not (found.modes or found.near):
-        return found.found.degenerate or "there is no mode"
+    if found.found.continuous_family is not None or not (found.modes or found.near_modes):
+        return found.found.singular_solutions or "there is no mode"
     return None
 
 
@@ -83,15 +83,15 @@ def drawable(found: AssemblyModes) -> ModesScene:
     """What there is to draw; raises ``BadRequest`` where there is nothing."""
     why = why_undrawn(found)
     if why is not None:
-        raise BadRequest(f"{found.setting.robot.name}: there is nothing to draw: {why}", None, "isolated modes")
+        raise BadRequest(f"{found.setup.robot.name}: there is nothing to draw: {why}", None, "isolated modes")
     return scene(found)
 
 
 def description(found: AssemblyModes, drawn: ModesScene) -> dict[str, Any]:
     """What was asked for and what is drawn, in a few numbers: enough to tell whether a picture is out of date."""
     return {
-        "robot": found.setting.robot.name,
-        "observe": list(found.setting.labels),
+        "robot": found.setup.robot.name,
+        "observe": list(found.setup.labels),
         "real": found.kind == "real",
         "at": str(found.pose),
         "complex": found.found.complex,
@@ -218,17 +218,17 @@ def _robot(sketch: Sketch, place: Any, drawn: ModesScene, each: Placed, k: int) 
 
 def _heading(whole: Any, found: AssemblyModes, drawn: ModesScene) -> float:
     """Write the title; its height (inches)."""
-    setting, count = found.setting, found.found
-    what = "directions of legs" if all(o.by_segment for o in setting.observed) else "values of"
-    held = f"{what} {', '.join(setting.labels)}" if found.kind == "hidden" else "motor coordinates"
+    setup, count = found.setup, found.found
+    what = "directions of legs" if all(o.by_segment for o in setup.observed) else "values of"
+    held = f"{what} {', '.join(setup.labels)}" if found.kind == "hidden" else "motor coordinates"
     many = found.count + ("" if count.complete else ", not proved to be all")
-    many += f"; {len(found.near)} near" if found.near else ""
+    many += f"; {len(found.near_modes)} near" if found.near_modes else ""
     many += f"; the first {MOST} drawn as robots" if len(drawn.placed) > MOST else ""
     if drawn.rest:
         many += f"\nof the points where the curves meet, only these fit leg{'s' * (len(drawn.rest) > 1)} "
         many += ", ".join(drawn.rest) + " as well"
     title = (
-        f"{setting.robot.name}   {setting.anatomy.architecture()}\nassembly modes with the same {held} as at "
+        f"{setup.robot.name}   {setup.decomposition.architecture()}\nassembly modes with the same {held} as at "
         f"{found.pose}: {many}"
     )
     return settle_title(whole, whole.suptitle(title, fontsize=12, va="top"))

@@ -86,7 +86,7 @@ class File:
             if asked.get(name) is not None and (path is None or Path(path).suffix.lower() not in FIGURES):
                 raise BadRequest(f"--{name} is of a figure", asked[name], f"--output with {', '.join(FIGURES)}")
             if asked.get(name) is not None:
-                function("paper:paper_for")(PNG, asked.get("width"), asked.get("font"))
+                function("figure_format:paper_for")(PNG, asked.get("width"), asked.get("font"))
         if path is None:
             if asked.get("plane") is not None and "plane" in self.takes:
                 raise BadRequest(
@@ -135,7 +135,9 @@ class File:
         """The file's content and what the JSON says more; raises ``BadRequest`` where there is nothing to draw."""
         maker = function(self.makers[ending])
         if ending in FIGURES and self.drawn:
-            maker = partial(maker, paper=function("paper:paper_for")(ending, asked.get("width"), asked.get("font")))
+            maker = partial(
+                maker, paper=function("figure_format:paper_for")(ending, asked.get("width"), asked.get("font"))
+            )
         if self.computed is None:
             return maker(found), {}
         value = function(self.computed)(found, **{name: asked[name] for name in (*self.takes, "seed")})
@@ -235,18 +237,18 @@ OUTPUTS = {
         ),
     ),
     "advise": Outputs("text.robots:advice"),
-    "atlas": Outputs(
+    "aspects": Outputs(
         "text.poses:atlas",
         (
             File(
                 "cannot draw the atlas",
-                figures("atlas:picture"),
+                figures("aspects:picture"),
                 "The picture of the atlas",
                 "Draw the table and, for three rods on cranks in a plane, the singular curve with the modes: "
                 "atlas.png, .pdf, .svg.",
-                computed="atlas:section",
+                computed="aspects:section",
                 record="section",
-                nothing="atlas:undrawn",
+                nothing="aspects:undrawn",
                 drawn=True,
             ),
         ),
@@ -300,12 +302,12 @@ OUTPUTS = {
             File("cannot draw the robots", {".svg": "drawings.schematic:derivation_svg"}, option=None, plotted=()),
         ),
     ),
-    "endings": Outputs(
+    "equilibria": Outputs(
         "text.endings:endings",
         (
             File(
                 "cannot draw the endings",
-                figures("endings:picture"),
+                figures("equilibria:picture"),
                 "The picture of the endings",
                 "Draw the endings: endings.png, .pdf, .svg.",
                 drawn=True,
@@ -360,7 +362,7 @@ OUTPUTS = {
             ),
         ),
     ),
-    "singular": Outputs(
+    "singularities": Outputs(
         "text.poses:singularity",
         (
             File(

@@ -17,7 +17,7 @@ from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.platform_motion import PlatformMotion
 from ..mechanism.pose import Pose
 from ..results import Result
-from .paper import BESIDE, PNG, Paper, legend_within, print_figure
+from .figure_format import BESIDE, PNG, Paper, legend_within, print_figure
 from .skeleton import legs_of, outline
 from .sketch import Sketch, axis_label
 from .view.view import plane_normal
@@ -178,8 +178,8 @@ class MapPlane:
 
         if not set(self.names) <= set("xyz"):
             return []
-        platform = at.twin.mechanism.platform
-        outer = outline(at.twin.mechanism, platform, at.pose(platform))
+        platform = at.model.mechanism.platform
+        outer = outline(at.model.mechanism, platform, at.pose(platform))
         strokes = [each for each in (*legs_of(at, (platform,)), outer) if np.ptp(each, axis=0).any()]
         if not strokes:
             return []

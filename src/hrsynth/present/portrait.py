@@ -46,13 +46,13 @@ class Portrait:
     normal: Array | None
 
     @classmethod
-    def of(cls, setting: ObservedRobot) -> Portrait:
+    def of(cls, setup: ObservedRobot) -> Portrait:
         """An observed robot."""
         return cls.draw(
-            setting.mechanism,
-            setting.anatomy.platform,
-            {each.link for each in setting.observed},
-            plane_normal(setting.motion),
+            setup.mechanism,
+            setup.decomposition.platform,
+            {each.link for each in setup.observed},
+            plane_normal(setup.motion),
         )
 
     @classmethod

@@ -12,7 +12,7 @@ from ..geometry.vectors import Array
 from ..kinematics.platform_motion import PlatformMotion
 from ..mechanism.pose import Grid
 from . import plots
-from .paper import Paper
+from .figure_format import Paper
 from .plots import MapPlane, cell_edges, panels, round_ticks, tick_values, tick_words
 
 COLUMNS = 4

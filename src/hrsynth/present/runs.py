@@ -10,13 +10,13 @@ import numpy as np
 
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
-from ..mechanism.sights import CameraObservation, NamedCamera
+from ..mechanism.cameras import CameraObservation, NamedCamera
+from ..simulation.crossings import TYPE_2
 from ..simulation.result import Servo
-from ..simulation.track import TYPE_2
 from ..tolerances import REST_OF_RUN, UNMOVED
 from . import palette
+from .figure_format import PNG, Paper, legend_within, print_figure, settle_title, wrap
 from .palette import SERIES
-from .paper import PNG, Paper, legend_within, print_figure, settle_title, wrap
 from .plots import empty_figure, entry, in_style, pose_words
 from .skeleton import legs_of, outline
 from .sketch import Box, Sketch
@@ -57,10 +57,10 @@ def picture(found: Servo, paper: Paper = PNG) -> bytes:
     """The run as a figure on ``paper``."""
     panels = list(_panels(found))
     figure = empty_figure(paper.wide(WIDE), TALL)
-    legs = ", ".join(found.setting.labels)
-    word = "legs " if all(each.by_segment for each in found.setting.observed) else ""
+    legs = ", ".join(found.setup.labels)
+    word = "legs " if all(each.by_segment for each in found.setup.observed) else ""
     title = figure.suptitle(
-        f"{found.setting.robot.name}, {word}{legs} observed: ended at {ENDS[found.ended]}\n"
+        f"{found.setup.robot.name}, {word}{legs} observed: ended at {ENDS[found.outcome]}\n"
         f"from {pose_words(found.start)} to {pose_words(found.goal)}",
         va="top",
     )
@@ -95,7 +95,7 @@ def picture(found: Servo, paper: Paper = PNG) -> bytes:
 
 def _pictures(found: Servo) -> list[tuple[NamedCamera, Array]]:
     """The cameras that see something, and half of their pictures where these have a size."""
-    every = eyes(found.setting)
+    every = eyes(found.setup)
     seen = [(eye, half_picture(eye)) for eye in every]
     return [(eye, half) for eye, half in seen if _seen_by(found, eye)]
 
@@ -103,20 +103,20 @@ def _pictures(found: Servo) -> list[tuple[NamedCamera, Array]]:
 def _seen_by(found: Servo, eye: NamedCamera) -> list[CameraObservation]:
     return [
         o
-        for o in found.setting.observed
+        for o in found.setup.observed
         if isinstance(o, CameraObservation)
-        and o.image(*_poses(found, o, found.target), REACH * found.target.twin.length)
-        and (o.camera.name if o.camera else found.setting.mechanism.reference) == eye.name
+        and o.image(*_poses(found, o, found.target), REACH * found.target.model.length)
+        and (o.camera.name if o.camera else found.setup.mechanism.reference) == eye.name
     ]
 
 
 def _poses(found: Servo, seen: CameraObservation, at: ClosedConfiguration) -> tuple[Array, Array]:
-    return at.pose(seen.seen_from or found.setting.mechanism.reference), at.pose(seen.link)
+    return at.pose(seen.seen_from or found.setup.mechanism.reference), at.pose(seen.link)
 
 
 def _picture(place: Any, found: Servo, eye: NamedCamera, half: Array) -> None:
     """What the camera sees: the ways of the middles of what is seen, and all of it at start, end and goal."""
-    size = REACH * found.target.twin.length
+    size = REACH * found.target.model.length
     states = [(found.run.configurations[0], START), (found.settled, END), (found.target, GOAL)]
     for number, seen in enumerate(_seen_by(found, eye)):
         ways = [seen.image(*_poses(found, seen, at), size) for at in found.run.configurations]
@@ -173,7 +173,7 @@ Curve = tuple[str, Array, str, str]
 
 def _panels(found: Servo) -> Iterator[tuple[str, list[Curve], float | None]]:
     """What is drawn against time: its name, its curves, the lower end of its scale."""
-    names = [f"leg {each.leg}" if each.by_segment else each.leg for each in found.setting.observed]
+    names = [f"leg {each.leg}" if each.by_segment else each.leg for each in found.setup.observed]
     yield "error ‖eᵢ‖", [(name, found.errors[:, i], SERIES[i % 6], STYLES[i % 6]) for i, name in enumerate(names)], 0.0
     path, goal = found.way, found.goal_position
     moved = [i for i in range(3) if np.ptp(path[:, i]) > UNMOVED or abs(path[-1, i] - goal[i]) > UNMOVED] or [0]
@@ -197,11 +197,11 @@ def _robots(figure: Any, found: Servo, above: float, panels: int) -> Box:
     states = [(found.run.configurations[0], START), (found.settled, END), (found.target, GOAL)]
     drawn = [(list(strokes(found, at)), style) for at, style in states]
     ground = ground_of(found)
-    modes = [] if found.ending.modes is None else [mode for mode in found.ending.modes.modes if not mode.goal]
+    modes = [] if found.run_outcome.modes is None else [mode for mode in found.run_outcome.modes.modes if not mode.goal]
     others = np.array([[getattr(mode.pose, name) for name in "xyz"] for mode in modes]).reshape(-1, 3)
     path = found.way
     every = np.vstack([ground, path, *(stroke for each, _ in drawn for stroke, _ in each)])
-    sketch = Sketch.of(plane_normal(found.setting.motion), ground, [])
+    sketch = Sketch.of(plane_normal(found.setup.motion), ground, [])
     entries = [entry("way of the platform", color=SERIES[0]), entry("joints of the base", **BASE)]
     if any(np.ptp(stroke, axis=0).any() for each, _ in drawn for stroke, _ in each):
         entries[:0] = [
@@ -242,12 +242,12 @@ def _robots(figure: Any, found: Servo, above: float, panels: int) -> Box:
 
 def strokes(found: Servo, at: ClosedConfiguration) -> Iterator[tuple[Array, bool]]:
     """The robot at a configuration as polylines (n, 3), and whether each is of the platform."""
-    platform = found.setting.anatomy.platform
+    platform = found.setup.decomposition.platform
     yield from ((stroke, False) for stroke in legs_of(at, platform))
-    yield from ((outline(at.twin.mechanism, link, at.pose(link)), True) for link in platform)
+    yield from ((outline(at.model.mechanism, link, at.pose(link)), True) for link in platform)
 
 
 def ground_of(found: Servo) -> Array:
     """The centres of the base's joints, (n, 3)."""
-    mechanism = found.target.twin.mechanism
+    mechanism = found.target.model.mechanism
     return np.array([joint.point for joint in mechanism.joints_of(mechanism.base)])

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..analysis.modes.assembly_mode import AssemblyMode
-from ..analysis.modes.curves import Circle, Curve, Line, Point, Reach, Sphere, shift_reach
+from ..analysis.modes.loci import Circle, Curve, Line, Point, Reach, Sphere, shift_reach
 from ..analysis.modes.modes import AssemblyModes
 from ..analysis.modes.tips import Tip, TipLoci
 from ..geometry.vectors import Array, inverse, transform
@@ -100,11 +100,11 @@ def scene(found: AssemblyModes) -> ModesScene:
     confined = found.confined
     plot = _platform(found) if confined is None or confined.back else _PLOTS[confined.motion](found, confined)
     listed = [(str(k), mode) for k, mode in enumerate(found.modes, 1)]
-    listed += [(f"near {k}", mode) for k, mode in enumerate(found.near, 1)]
+    listed += [(f"near {k}", mode) for k, mode in enumerate(found.near_modes, 1)]
     placed = tuple(_place(found, plot, label, mode) for label, mode in listed)
     about = np.vstack([*(trace.points.reshape(-1, 3) for trace in plot.traces), *(each.at[None] for each in placed)])
-    drawn = tuple(Trace(_reach_points(reach, about, found.goal.twin.length), words) for reach, words in plot.reaches)
-    mechanism = found.goal.twin.mechanism
+    drawn = tuple(Trace(_reach_points(reach, about, found.goal.model.length), words) for reach, words in plot.reaches)
+    mechanism = found.goal.model.mechanism
     ground = np.array([joint.point for joint in mechanism.joints_of(mechanism.base)])
     rest = tuple(leg for leg in found.labels if plot.legs and leg not in plot.legs)
     return ModesScene(_normal(found), (*plot.traces, *drawn), placed, ground, rest)
@@ -113,7 +113,7 @@ def scene(found: AssemblyModes) -> ModesScene:
 def _place(found: AssemblyModes, plot: _Plot, label: str, mode: AssemblyMode) -> Placed:
     assert mode.bodies is not None
     goal = found.goal
-    bodies = tuple(outline(goal.twin.mechanism, body, X) for body, X in mode.bodies.items())
+    bodies = tuple(outline(goal.model.mechanism, body, X) for body, X in mode.bodies.items())
     strokes = () if mode.configuration is None else legs_of(mode.configuration, tuple(mode.bodies))
     state = NEAR if label.startswith(NEAR) else GOAL if mode.goal else _STATES[mode.reachable]
     said = "not found" if mode.reachable is None else "not assembled"
@@ -124,7 +124,7 @@ def _place(found: AssemblyModes, plot: _Plot, label: str, mode: AssemblyMode) ->
             f"{noun}{'s' * (len(names) > 1)} {', '.join(names)}" for noun, names in mode.left_open
         )
     else:
-        words = f"{said}: beyond limits" if mode.beyond else "assembled"
+        words = f"{said}: beyond limits" if mode.beyond_limits else "assembled"
     return Placed(label, state, words, plot.mark(mode), bodies, strokes)
 
 
@@ -132,7 +132,7 @@ def _normal(found: AssemblyModes) -> Array | None:
     """The normal of the plane in which the platform moves, where there is one."""
     if found.confined is not None and found.confined.plane is not None:
         return found.confined.plane
-    shifts = found.setting.motion.translations
+    shifts = found.setup.motion.translations
     flat = found.confined is None or found.confined.motion == "translations"
     return np.cross(*shifts.T) if shifts.shape[1] == 2 and flat else None
 
@@ -145,7 +145,7 @@ def _at_goal(found: AssemblyModes, tip: Tip) -> Array:
 
 def _platform(found: AssemblyModes) -> _Plot:
     """The platform's own position, and no curves."""
-    bodies = (each.bodies for each in (*found.modes, *found.near))
+    bodies = (each.bodies for each in (*found.modes, *found.near_modes))
     body = next(iter(next(each for each in bodies if each)))
     p = found.pose
     place = inverse(found.goal.pose(body)) @ np.array([p.x, p.y, p.z, 1.0])
@@ -253,7 +253,7 @@ def _deciding(found: AssemblyModes, confined: TipLoci, count: int) -> tuple[int,
         tip = confined.tips[k]
         places = [_Plot(tip.body, tip.place).mark(mode) for mode in found.modes]
         least = min((float(np.linalg.norm(a - b)) for a, b in combinations(places, 2)), default=0.0)
-        return not isinstance(tip.curve, Point), round(least / found.goal.twin.length, 6), k
+        return not isinstance(tip.curve, Point), round(least / found.goal.model.length, 6), k
 
     last = max(legs, key=apart, default=None)
     return tuple(sorted(legs, key=lambda k: (k == last, not isinstance(confined.tips[k].curve, Point))))

@@ -22,7 +22,7 @@ def outline(mechanism: Mechanism, link: str, X: Array) -> Array:
 
 def legs_of(at: ClosedConfiguration, platform: tuple[str, ...]) -> tuple[Array, ...]:
     """All links but the base and ``platform`` as polygons or segments, and the way that each slider has gone."""
-    mechanism = at.twin.mechanism
+    mechanism = at.model.mechanism
     moved = {link: at.pose(link) for link in mechanism.links}
     links = [outline(mechanism, link, X) for link, X in moved.items() if link not in (mechanism.base, *platform)]
     return tuple(stroke for stroke in (*links, *_slid(mechanism, moved)) if len(stroke) > 2)

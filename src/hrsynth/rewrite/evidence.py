@@ -15,16 +15,16 @@ from ..kinematics.pinocchio_model import PinocchioModel
 from ..kinematics.sampling import Samples
 from ..kinematics.tasks import solve
 from ..mechanism import Joint, JointType, Mechanism, graphs
+from ..mechanism.cameras import CameraObservation
 from ..mechanism.composites import WordEdge, WordGraph
 from ..mechanism.legs import LegDecomposition
 from ..mechanism.normal import centre_pair
 from ..mechanism.observations.direction import SeenAxis
-from ..mechanism.sights import CameraObservation
 from ..tolerances import LOCUS, SOLVED
 
 
 @dataclass(frozen=True, eq=False)
-class Flat:
+class LinearLocus:
     """The set a point or a direction moves on: its dimension as a flat (0 fixed, 1 line, 2 plane, 3 space), and
     orthonormal ``axes`` with the flat's directions first, the normals last (rows)."""
 
@@ -37,11 +37,11 @@ class Flat:
         return self.axes[2]
 
 
-def locus(points: Array, scale: float) -> Flat:
+def locus(points: Array, scale: float) -> LinearLocus:
     """The smallest flat that holds all points, shape (n, 3); ``scale`` is what no extent is relative to."""
     centred = points - points.mean(axis=0)
     _, s, Vt = np.linalg.svd(centred / np.sqrt(len(points)), full_matrices=True)
-    return Flat(int(np.sum(s > LOCUS * scale)), Vt)
+    return LinearLocus(int(np.sum(s > LOCUS * scale)), Vt)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class ProximalChain:
     length: float
 
     @cached_property
-    def anchor_locus(self) -> Flat:
+    def anchor_locus(self) -> LinearLocus:
         """The flat on which A moves."""
         return locus(self.anchors, self.length)
 
@@ -95,11 +95,11 @@ class ProximalChain:
 class Evidence:
     """Facts about the real robot, gathered from its samples and from its legs moved on their own."""
 
-    def __init__(self, anatomy: LegDecomposition, samples: Samples) -> None:
-        self.anatomy = anatomy
+    def __init__(self, decomposition: LegDecomposition, samples: Samples) -> None:
+        self.anatomy = decomposition
         self.samples = samples
-        self.mechanism: Mechanism = anatomy.mechanism
-        self.reference = samples.question.reference
+        self.mechanism: Mechanism = decomposition.mechanism
+        self.reference = samples.observation_model.reference
         self._proximal: dict[str, ProximalChain | None] = {}
 
     def directions(self, index: int) -> Array:
@@ -111,15 +111,15 @@ class Evidence:
     def far(self, index: int) -> Array | None:
         """A unit vector in base axes, fixed in the reference link, as far as possible from all sampled values of what
         the chain of observation ``index`` turns first; None where the values do not say what that is."""
-        seen = self.samples.question.observations[index]
+        seen = self.samples.observation_model.observations[index]
         assert isinstance(seen, SeenAxis | CameraObservation)
         values = np.asarray([target.measured[index][1] for member in self.samples.members for target in member.way])
         units = np.broadcast_to(seen.dimension, seen.size)
-        pointing = seen.pointing(values * self.samples.twin.length**units)
+        pointing = seen.pointing(values * self.samples.model.length**units)
         home = self.mechanism.links[seen.seen_from or self.reference].pose @ seen.view
         return None if pointing is None else home[:3, :3] @ far_from(pointing)
 
-    def spins(self, link: str, direction: Array) -> bool:
+    def can_spin(self, link: str, direction: Array) -> bool:
         """Whether a link can turn about its own direction with every other link at rest.
 
         Links that it carries along on a P of the same direction may turn with it.
@@ -214,20 +214,20 @@ def _move_at_random(
     part = Mechanism.of(
         "part", [mechanism.links[n] for n in mechanism.links if n in nodes], joints, base=reference, platform=before
     )
-    twin = PinocchioModel(part, mechanism.length)
+    model = PinocchioModel(part, mechanism.length)
     rng = np.random.default_rng(1)
     home = part.links[before].pose
     local = home[:3, :3].T @ (anchor - home[:3, 3])
     rotations, anchors = [], []
     for _ in range(12):
-        q = twin.q0
-        if not twin.loops:
-            q = twin.integrate(q, rng.uniform(-0.6, 0.6, twin.nv))
+        q = model.q0
+        if not model.loops:
+            q = model.integrate(q, rng.uniform(-0.6, 0.6, model.nv))
         else:
             for _ in range(4):
-                kernel, _ = ClosedConfiguration.of(twin, q).kernel()
-                q, _ = solve(twin, twin.integrate(q, 0.12 * random_in(kernel, rng)), tolerance=SOLVED)
-        X = twin.pose(q, before)
+                kernel, _ = ClosedConfiguration.of(model, q).kernel()
+                q, _ = solve(model, model.integrate(q, 0.12 * random_in(kernel, rng)), tolerance=SOLVED)
+        X = model.pose(q, before)
         rotations.append(X[:3, :3] @ home[:3, :3].T)
         anchors.append(transform(X, local))
     return np.asarray(rotations), np.asarray(anchors)

@@ -38,7 +38,7 @@ class VirtualChain(Value):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SensorChain(Value):
+class ObservationChain(Value):
     """The virtual chain of an observation that is no direction of a segment: its own ``links`` and ``joints`` between
     the ``reference`` link and ``link``, the joints that are ``actuators``. An encoder has neither links nor joints: its
     actuator is the real joint."""
@@ -62,7 +62,7 @@ class State(Value):
     """Labels of the legs that were dropped."""
     owners: Mapping[str, str] = field(default_factory=dict)
     """The leg of each virtual link."""
-    sensors: tuple[SensorChain, ...] = ()
+    sensors: tuple[ObservationChain, ...] = ()
     """The chains of observations that are no directions of segments: they stay as the lift makes them."""
 
     @property
@@ -93,7 +93,7 @@ class State(Value):
         """Labels of the legs that still have a virtual chain, and of what else is observed, in order."""
         return tuple(dict.fromkeys([*(chain.leg for chain in self.chains), *(each.leg for each in self.sensors)]))
 
-    def anatomy(self) -> LegDecomposition:
+    def decomposition(self) -> LegDecomposition:
         """The legs of the rewritten mechanism: the real ones that are left, with their virtual links."""
         mechanism = self.mechanism
         legs = []
@@ -109,13 +109,13 @@ class State(Value):
                 drawn = self._hung(drawn, chain, legs)
         return LegDecomposition(drawn, tuple(n for n in self.real.platform if n in mechanism.links), tuple(legs))
 
-    def _hung(self, mechanism: Mechanism, chain: SensorChain, legs: list[Leg]) -> Mechanism:
+    def _hung(self, mechanism: Mechanism, chain: ObservationChain, legs: list[Leg]) -> Mechanism:
         """Put a sensor's chain into the leg that has its link or else its reference, or make it a leg of its own; as it
         is drawn and written: what it hangs on outside of that is taken for the base."""
         for link in (chain.link, chain.reference):
             for number, leg in enumerate(legs):
                 if link in leg.links:
-                    own = {mechanism.base, leg.attach, *leg.links}
+                    own = {mechanism.base, leg.platform_link, *leg.links}
                     legs[number] = replace(leg, links=(*leg.links, *chain.links), joints=(*leg.joints, *chain.joints))
                     return _relink(mechanism, chain, own)
         attach = chain.reference if chain.link == mechanism.base else chain.link
@@ -124,7 +124,7 @@ class State(Value):
 
     def _joints(self, leg: Leg, links: set[str]) -> list[str]:
         mechanism = self.mechanism
-        ends = {mechanism.base, leg.attach}
+        ends = {mechanism.base, leg.platform_link}
         names = []
         others = {n for other in self.real.legs if other.label != leg.label for n in other.links}
         others |= {n for n, owner in self.owners.items() if owner != leg.label}
@@ -143,10 +143,10 @@ class State(Value):
 
     def architecture(self) -> Architecture:
         """The architecture so far, in words."""
-        return self.anatomy().architecture()
+        return self.decomposition().architecture()
 
 
-def _relink(mechanism: Mechanism, chain: SensorChain, known: set[str]) -> Mechanism:
+def _relink(mechanism: Mechanism, chain: ObservationChain, known: set[str]) -> Mechanism:
     """With the ends of a chain that lie on no known link moved to the base."""
     ends = [(chain.joints[0], chain.reference), (chain.joints[-1], chain.link)]
     joints = {name: mechanism.joints[name].relinked(link, mechanism.base) for name, link in ends if link not in known}

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Protocol
 
 from ..mechanism import Mechanism
 from ..mechanism.observation import labels_of
-from ..progress import tell
+from ..progress import report
 from ..records import ANGLE, Record, Recorded
 from .evidence import Evidence
 from .rule import Proposal, Refusal, Rule, Stage
@@ -55,7 +55,7 @@ class Step(Record):
     always: bool = field(default=False, compare=False, repr=False)
     keeps: tuple[str, ...] = field(default=(), compare=False, repr=False)
     bodies: tuple[str, ...] = field(default=(), compare=False, repr=False)
-    taken_back: bool = field(default=False, repr=False)
+    discarded: bool = field(default=False, repr=False)
 
     def measured(self, check: Check) -> Step:
         """The step with its own angle, where it was accepted unchecked."""
@@ -105,7 +105,7 @@ class Rewriting:
         """After the check of one proposal: its state where that passes."""
         if isinstance(proposal, Refusal):
             return self._after(rule, leg, False, proposal.reason)
-        tell(f"{rule.name} {leg or ''}")
+        report(f"{rule.name} {leg or ''}")
         if self.check is None or rule.stage in self.unchecked:
             return self._after(rule, leg, True, proposal.reason, None, proposal)
         if self.tried >= BUDGET:
@@ -169,7 +169,7 @@ def whole_robot(stage: Stage) -> Strategy:
     return run
 
 
-def best(stage: Stage, after: Strategy, left: Callable[[Rewriting], Iterable[str]]) -> Strategy:
+def choose_fewest_legs(stage: Stage, after: Strategy, left: Callable[[Rewriting], Iterable[str]]) -> Strategy:
     """The proposal of a stage's rules from which another strategy leaves the fewest legs; none if none leaves fewer
     than there are. The first that leaves nothing ends the search; others are taken back on the trace."""
 
@@ -192,12 +192,12 @@ def best(stage: Stage, after: Strategy, left: Callable[[Rewriting], Iterable[str
 
 
 def _taken_back(step: Step) -> Step:
-    return replace(step, accepted=False, reason=f"{step.reason} (taken back: legs remain)", state=None, taken_back=True)
+    return replace(step, accepted=False, reason=f"{step.reason} (taken back: legs remain)", state=None, discarded=True)
 
 
 def observed_legs(at: Rewriting) -> tuple[str, ...]:
     """The legs that are observed."""
-    return labels_of(at.evidence.samples.question.observations)
+    return labels_of(at.evidence.samples.observation_model.observations)
 
 
 def unobserved_legs(at: Rewriting) -> tuple[str, ...]:
@@ -212,7 +212,7 @@ def keep_unobserved(at: Rewriting) -> Rewriting:
     return replace(at, steps=at.steps + tuple(Step("keep", leg, True, reason, None) for leg in unobserved_legs(at)))
 
 
-def unless_blind(strategy: Strategy) -> Strategy:
+def require_informative_leg(strategy: Strategy) -> Strategy:
     """A strategy for robots of which some leg is not blind."""
     return lambda at: strategy(at) if at.state.actuators else at
 
@@ -232,7 +232,7 @@ DROPPED = each_leg(unobserved_legs, Stage.LEG)
 SIMPLIFIED = chain(
     GENERAL,
     each_leg(observed_legs, Stage.FORM),
-    unless_blind(chain(DROPPED, best(Stage.ENDS, DROPPED, unobserved_legs), keep_unobserved)),
+    require_informative_leg(chain(DROPPED, choose_fewest_legs(Stage.ENDS, DROPPED, unobserved_legs), keep_unobserved)),
 )
 """The simplified form, as far as the certificate goes along with it: where unobserved legs hold the platform, the
 ends of the observed legs are changed; what still does not go is kept."""
@@ -242,7 +242,7 @@ FORMS = {"simplified": SIMPLIFIED, "general": GENERAL}
 """The forms of a hidden robot that can be asked for."""
 
 
-def trusting(evidence: Evidence, *, change_ends: bool) -> list[Rewriting]:
+def apply_unchecked(evidence: Evidence, *, change_ends: bool) -> list[Rewriting]:
     """The forms that the rules give when no condition is checked; with ``change_ends`` one for each choice of outer
     axes besides."""
     start = chain(GENERAL, each_leg(observed_legs, Stage.FORM))(Rewriting.of(evidence))

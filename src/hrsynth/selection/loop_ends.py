@@ -15,10 +15,10 @@ from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..records import DEG, MM, As, Number, Shown
 from ..results import Value
-from ..simulation.ending import GOAL
-from ..simulation.endings.endings import RestSearch
-from ..simulation.endings.radius import CertifiedRadius, certified_radius
-from ..simulation.endings.rests import CRITICAL
+from ..simulation.equilibria.attraction_radius import CertifiedRadius, certified_radius
+from ..simulation.equilibria.equilibria import EquilibriumSearch
+from ..simulation.equilibria.equilibrium import CRITICAL
+from ..simulation.outcome import GOAL
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -32,14 +32,14 @@ class LoopEnds(Value):
     why: str = ""
 
     @classmethod
-    def of(cls, setting: ObservedRobot, goal: ClosedConfiguration, rounds: Iterable[Array] | None = None) -> LoopEnds:
+    def of(cls, setup: ObservedRobot, goal: ClosedConfiguration, rounds: Iterable[Array] | None = None) -> LoopEnds:
         """Those of a goal; ``rounds`` of starts as for :func:`.critical_points`."""
         try:
-            found = RestSearch.of(setting, goal).answer(minima=True, rounds=rounds)
-            others = tuple(sorted(each.kind for each in found.attracting if each.kind != GOAL and not each.beyond))
-            if not all(each.by_segment for each in setting.observed):
+            found = EquilibriumSearch.of(setup, goal).answer(minima=True, rounds=rounds)
+            others = tuple(sorted(each.kind for each in found.stable if each.kind != GOAL and not each.beyond_limits))
+            if not all(each.by_segment for each in setup.observed):
                 return cls(others, None, "the radius is one of directions of segments only")
-            radius = certified_radius(setting, goal)
+            radius = certified_radius(setup, goal)
         except HrsynthError as error:
             return cls(None, None, str(error))
         return cls(others, radius, "" if radius.length else radius.reason)

@@ -13,11 +13,12 @@ from typing import Annotated, NamedTuple, TypedDict
 import numpy as np
 
 from ..analysis.accuracy.accuracy import errors_at
-from ..analysis.accuracy.cones import Blur, Cones, unseen
+from ..analysis.accuracy.measurement_bounds import Cones, MeasurementBounds, unseen
 from ..analysis.accuracy.pose_errors import PoseErrors
-from ..analysis.asked import configurations_at
-from ..analysis.aspects.path import Aspects
-from ..analysis.aspects.words import SEPARATED
+from ..analysis.analysis_declaration import analysis
+from ..analysis.aspects.path import PathPlanner
+from ..analysis.aspects.verdicts import SEPARATED
+from ..analysis.configuration_report import ConfigurationAnalysis, ConfigurationReport
 from ..analysis.modes.modes import AssemblyModes, modes
 from ..analysis.observed import (
     UNLIMITED,
@@ -30,8 +31,7 @@ from ..analysis.observed import (
     SeeLike,
     StartPose,
 )
-from ..analysis.posture import ConfigurationAnalysis, Posture
-from ..analysis.question import analysis
+from ..analysis.pose_requests import configurations_at
 from ..analysis.verdict import CONTROLLABLE, verdict_of
 from ..budgets import AXIS_SEEN, SELECT_ROUNDS
 from ..errors import BadRequest, HrsynthError
@@ -42,13 +42,13 @@ from ..mechanism.observation import labels_of
 from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.pose import Pose, PoseLike, asked_pose
 from ..options import option, options_of, require_range
-from ..progress import part, tell
+from ..progress import part, report
 from ..records import DEG, MM, As, Number, Record, Recorded, Shown, Word, recorded
 from ..results import Compared, Result, Value, by_name
 from ..simulation.camera import cylinders, place_camera
-from ..simulation.ending import GOAL
-from ..simulation.endings.endings import RestSearch
-from ..simulation.endings.search import starts
+from ..simulation.equilibria.equilibria import EquilibriumSearch
+from ..simulation.equilibria.search import starts
+from ..simulation.outcome import GOAL
 from ..simulation.servo import servo
 from .loop_ends import LoopEnds, fewer_are_better
 from .sight import CameraView, camera_at, of_focal
@@ -82,7 +82,7 @@ class Criteria:
     """Sets, the most accurate first, of which modes and aspects are asked."""
     runs: Annotated[int, option("How many sets, best first, must pass a simulated run.", low=0)] = 3
     """Sets that a simulated run is to lead to the goal."""
-    endings: Annotated[
+    equilibria: Annotated[
         int,
         option(
             "For how many of the examined sets, the most accurate first, to compute where else the loop may end.",
@@ -90,7 +90,7 @@ class Criteria:
         ),
     ] = 20
     """Sets, of those that are examined and the most accurate first, whose endings are sought."""
-    sight: Annotated[
+    visible_from: Annotated[
         str | None,
         option(
             "Pose of the camera on the link that carries it (x right, y down, z ahead), such as "
@@ -111,7 +111,7 @@ class Criteria:
     """Deprecated, as what is examined then depends on the machine: time after which no further set is begun."""
 
     def __post_init__(self) -> None:
-        if self.sight is None and self.focal != FOCAL:
+        if self.visible_from is None and self.focal != FOCAL:
             raise BadRequest("focal length without a camera", self.focal, "together with --sight")
         for each in options_of(Criteria):
             if each.kind is int:
@@ -133,7 +133,7 @@ class ModeCount(Record):
     @classmethod
     def of(cls, found: AssemblyModes) -> ModeCount:
         """Of a list of modes."""
-        alike = (*found.modes, *found.near)
+        alike = (*found.modes, *found.near_modes)
         return cls(len(alike), sum(mode.reachable is True for mode in alike), found.found.complete)
 
     reason = Shown(str | None, lambda self: self.why or None)
@@ -168,7 +168,7 @@ class Candidate(Value):
     start_modes: ModeCount | None = None
     goal_modes: ModeCount | None = None
     aspect: Recorded[Decision | None] = None
-    ends: Annotated[LoopEnds | None, As("endings")] = None
+    equilibria: Annotated[LoopEnds | None, As("equilibria")] = None
     run: Recorded[Decision | None] = None
     examined: Recorded[bool] = True
 
@@ -176,7 +176,7 @@ class Candidate(Value):
     def rank(self) -> tuple[float, ...]:
         """What the best of the examined sets has least of: other poses that attract, certified radius, then ``order``;
         sets whose endings were not sought come last."""
-        return (*(LoopEnds(None, None) if self.ends is None else self.ends).order, *self.order)
+        return (*(LoopEnds(None, None) if self.equilibria is None else self.equilibria).order, *self.order)
 
     @property
     def order(self) -> tuple[float, float, int]:
@@ -212,13 +212,13 @@ class Selection(Result, shown_as="select"):
     """All sets of legs up to a size for one displacement: the kept ones by their ``rank``, those not examined, the most
     accurate at the goal first, then the discarded ones."""
 
-    setting: Annotated[ObservedRobot, As(flat=True, without=("observed",))]
+    setup: Annotated[ObservedRobot, As(flat=True, without=("observed",))]
     start: Annotated[Pose, As("from")]
     goal: Annotated[Pose, As("to")]
     candidates: Annotated[tuple[Candidate, ...], As("sets")]
-    blur: Blur
+    bounds: MeasurementBounds
     """How wrong each measurement may be."""
-    sight: CameraView | None
+    visible_from: CameraView | None
     left: str | None
     """Why sets were not examined, None where all were."""
 
@@ -226,7 +226,7 @@ class Selection(Result, shown_as="select"):
         """The robot, and the set that is best."""
         best = f"best {', '.join(self.kept[0].legs)}" if self.kept else "none is kept"
         more = f", {len(self.unexamined)} not examined" if self.unexamined else ""
-        return f"{self.setting.robot.name}: {len(self.candidates)} sets, {len(self.kept)} kept{more}, {best}"
+        return f"{self.setup.robot.name}: {len(self.candidates)} sets, {len(self.kept)} kept{more}, {best}"
 
     @property
     def kept(self) -> tuple[Candidate, ...]:
@@ -242,27 +242,27 @@ class Selection(Result, shown_as="select"):
     @recorded()
     def fewer(self) -> str | None:
         """Why the best set serves better than one with more legs, None if that is not seen."""
-        known = [(each.legs, each.ends) for each in self.kept if each.ends is not None]
+        known = [(each.legs, each.equilibria) for each in self.kept if each.equilibria is not None]
         return fewer_are_better(known[0], known[1:]) if known and known[0][0] == self.kept[0].legs else None
 
     @property
     @recorded(As("cones"))
     def cones_record(self) -> dict[str, float]:
         """The half-angles of the cones by leg, in degrees."""
-        angles = np.degrees(self.blur.cones).tolist()
-        return {o.leg: cone for o, cone in zip(self.setting.observed, angles, strict=True) if cone}
+        angles = np.degrees(self.bounds.cones).tolist()
+        return {o.leg: cone for o, cone in zip(self.setup.observed, angles, strict=True) if cone}
 
     @property
     @recorded(As("sight"))
     def sight_record(self) -> SightRecord | None:
         """The camera; None where none was asked for."""
-        eye = self.sight
+        eye = self.visible_from
         return None if eye is None else SightRecord(eye.reference, eye.camera.place, eye.camera.focal)
 
-    noise = Shown(dict[str, float], lambda self: self.blur.amounts, "by its unit (px, m, rad)")
+    noise = Shown(dict[str, float], lambda self: self.bounds.amounts, "by its unit (px, m, rad)")
     best = Shown(list[str] | None, lambda self: self.kept[0].legs if self.kept else None)
     not_examined = Shown(Unexamined, lambda self: {"count": len(self.unexamined), "reason": self.left})
-    unlimited = Shown(list[str], lambda self: self.setting.unlimited, UNLIMITED)
+    limits_ignored = Shown(list[str], lambda self: self.setup.limits_ignored, UNLIMITED)
 
 
 @analysis(
@@ -313,28 +313,28 @@ def select(
     <Selection: 3rrr_m1: 7 sets, 1 kept, best 1, 2, 3>
     """
     wanted = [asked_pose(each) for each in (start, goal)]
-    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed).telling(wanted)
-    others = not all(o.by_segment for o in setting.observed)
-    if others and criteria.sight is not None:
-        setting.by_segments("select with --sight")
+    setup = ObservedRobot.of(robot, observe, camera, see=see, seed=seed).telling(wanted)
+    others = not all(o.by_segment for o in setup.observed)
+    if others and criteria.visible_from is not None:
+        setup.by_segments("select with --sight")
     if observe is None and not others:
-        setting = replace(setting, observed=setting.all_legs)
-    directed = any(isinstance(o, SeenAxis) for o in setting.observed)
-    blur = Blur.of(
-        CONE if cone is None and directed and (noise is None or not others) else cone, noise, setting.observed
+        setup = replace(setup, observed=setup.all_legs)
+    directed = any(isinstance(o, SeenAxis) for o in setup.observed)
+    blur = MeasurementBounds.of(
+        CONE if cone is None and directed and (noise is None or not others) else cone, noise, setup.observed
     )
-    ends = configurations_at(setting, wanted)
+    ends = configurations_at(setup, wanted)
     work = _Work(
-        setting,
+        setup,
         ends[0],
         ends[1],
         blur,
-        _sight(setting, ends, criteria),
+        _sight(setup, ends, criteria),
         criteria,
         np.inf if criteria.seconds is None else time.monotonic() + criteria.seconds,
         seed,
     )
-    labels = labels_of(setting.observed)
+    labels = labels_of(setup.observed)
     sets = [legs for count in range(1, min(criteria.size, len(labels)) + 1) for legs in combinations(labels, count)]
     looked = []
     for number, legs in enumerate(sets, 1):
@@ -348,31 +348,31 @@ def select(
             () if each.discarded is not None else each.rank,
         )
     )
-    poses = [setting.motion.pose(at.pose(setting.motion.link)) for at in ends]
-    return Selection(setting, poses[0], poses[1], tuple(found), blur, work.sight, left)
+    poses = [setup.motion.pose(at.pose(setup.motion.link)) for at in ends]
+    return Selection(setup, poses[0], poses[1], tuple(found), blur, work.sight, left)
 
 
-def _sight(setting: ObservedRobot, ends: Sequence[ClosedConfiguration], criteria: Criteria) -> CameraView | None:
-    if criteria.sight is None:
+def _sight(setup: ObservedRobot, ends: Sequence[ClosedConfiguration], criteria: Criteria) -> CameraView | None:
+    if criteria.visible_from is None:
         return None
-    rods = cylinders(setting.mechanism, setting.observed)
-    reference = setting.mechanism.reference
+    rods = cylinders(setup.mechanism, setup.observed)
+    reference = setup.mechanism.reference
     camera = (
         place_camera(rods, reference, [at.pose for at in ends], of_focal(criteria.focal))
-        if criteria.sight == AUTO
-        else camera_at(criteria.sight, criteria.focal)
+        if criteria.visible_from == AUTO
+        else camera_at(criteria.visible_from, criteria.focal)
     )
-    return CameraView(camera, reference, {o.leg: rod for o, rod in zip(setting.observed, rods, strict=True)})
+    return CameraView(camera, reference, {o.leg: rod for o, rod in zip(setup.observed, rods, strict=True)})
 
 
 @dataclass(frozen=True, eq=False)
 class _Work:
     """What examines sets of legs between two configurations; none is begun after a point in time."""
 
-    setting: ObservedRobot
+    setup: ObservedRobot
     start: ClosedConfiguration
     goal: ClosedConfiguration
-    blur: Blur
+    blur: MeasurementBounds
     sight: CameraView | None
     criteria: Criteria
     until: float
@@ -380,33 +380,33 @@ class _Work:
 
     def watching(self, legs: Sequence[str]) -> ObservedRobot:
         """The setting with some of what is observed."""
-        return replace(self.setting, observed=tuple(o for o in self.setting.observed if o.leg in legs))
+        return replace(self.setup, observed=tuple(o for o in self.setup.observed if o.leg in legs))
 
     def first(self, legs: tuple[str, ...]) -> Candidate:
         """What is quickly said of a set: verdict, singular ends, sight, accuracy."""
-        tell("accuracy")
-        setting = self.watching(legs)
+        report("accuracy")
+        setup = self.watching(legs)
         try:
-            verdict = verdict_of(setting, legs, setting.samples)
+            verdict = verdict_of(setup, legs, setup.samples)
             if verdict.verdict != CONTROLLABLE:
-                lost = f", not seen: {verdict.named}" if verdict.lost else ""
+                lost = f", not seen: {verdict.named}" if verdict.unobserved else ""
                 return Candidate(legs, verdict.verdict, verdict.verdict + lost)
-            analysis = ConfigurationAnalysis.of(setting)
+            analysis = ConfigurationAnalysis.of(setup)
             ends = (("start", self.start), ("goal", self.goal))
-            behind = [(name, unseen(at, setting.samples.question)) for name, at in ends]
+            behind = [(name, unseen(at, setup.samples.observation_model)) for name, at in ends]
             reasons = [f"{o.kind} {o.leg} is not in front of its camera at the {name}" for name, o in behind if o]
             if reasons:
                 return Candidate(legs, verdict.verdict, reasons[0])
             reasons = [
                 f"the {name} is beyond the limits of {', '.join(joints)}"
                 for name, at in ends
-                if (joints := outside(at.twin, at.q))
+                if (joints := outside(at.model, at.q))
             ]
             reasons += [reason for name, at in ends if (reason := _singular_at(name, analysis.classify(at)))]
         except HrsynthError as error:
             return Candidate(legs, "undecided", str(error))
-        blur = self.blur.select([i for i, o in enumerate(self.setting.observed) if o.leg in legs])
-        found = Candidate(legs, verdict.verdict, next(iter(reasons), None), errors_at(setting, blur, self.goal))
+        blur = self.blur.select([i for i, o in enumerate(self.setup.observed) if o.leg in legs])
+        found = Candidate(legs, verdict.verdict, next(iter(reasons), None), errors_at(setup, blur, self.goal))
         return self.look(found, (self.start, self.goal))
 
     def look(self, candidate: Candidate, configurations: Sequence[ClosedConfiguration]) -> Candidate:
@@ -423,12 +423,12 @@ class _Work:
         """The candidate with its modes and whether start and goal lie in one aspect."""
         if candidate.discarded:
             return candidate
-        setting = self.watching(candidate.legs)
-        tell("modes")
-        start_modes, goal_modes = self._modes(setting, self.start), self._modes(setting, self.goal)
-        tell("aspects")
+        setup = self.watching(candidate.legs)
+        report("modes")
+        start_modes, goal_modes = self._modes(setup, self.start), self._modes(setup, self.goal)
+        report("aspects")
         try:
-            answer = Aspects.of(setting).join(self.start, self.goal, seed=self.seed, budget=BUDGET)
+            answer = PathPlanner.of(setup).join(self.start, self.goal, seed=self.seed, budget=BUDGET)
             aspect = Decision(answer.verdict, answer.reason)
         except HrsynthError as error:
             aspect = Decision("undecided", str(error))
@@ -440,9 +440,9 @@ class _Work:
         return replace(candidate, start_modes=start_modes, goal_modes=goal_modes, aspect=aspect, discarded=why)
 
     @staticmethod
-    def _modes(setting: ObservedRobot, at: ClosedConfiguration) -> ModeCount:
+    def _modes(setup: ObservedRobot, at: ClosedConfiguration) -> ModeCount:
         try:
-            return ModeCount.of(modes(setting, at=at))
+            return ModeCount.of(modes(setup, at=at))
         except HrsynthError as error:
             return ModeCount(None, None, False, str(error))
 
@@ -480,44 +480,44 @@ class _Work:
 
     def find_endings(self, candidate: Candidate, number: int) -> Candidate:
         """The candidate, the ``number``-th that is examined, with where its loop may end."""
-        if candidate.discarded or number > self.criteria.endings:
+        if candidate.discarded or number > self.criteria.equilibria:
             return candidate
-        tell("endings")
-        setting = self.watching(candidate.legs)
-        rounds = self.rounds if all(o.by_segment for o in self.setting.observed) else self._rounds(setting)
-        return replace(candidate, ends=LoopEnds.of(setting, self.goal, rounds))
+        report("equilibria")
+        setup = self.watching(candidate.legs)
+        rounds = self.rounds if all(o.by_segment for o in self.setup.observed) else self._rounds(setup)
+        return replace(candidate, equilibria=LoopEnds.of(setup, self.goal, rounds))
 
     @cached_property
     def rounds(self) -> tuple[Array, ...]:
         """Starts from which the endings of all sets of directions are sought."""
-        return self._rounds(self.setting)
+        return self._rounds(self.setup)
 
-    def _rounds(self, setting: ObservedRobot) -> tuple[Array, ...]:
+    def _rounds(self, setup: ObservedRobot) -> tuple[Array, ...]:
         """Starts at which all that a setting observes is in front of its camera."""
-        system = RestSearch.of(setting, self.goal).system
-        homes = np.array([system.system.read(at.pose) for at in (self.goal, *setting.configurations)])
-        return tuple(islice(starts(system, homes, self.seed, setting), SELECT_ROUNDS))
+        system = EquilibriumSearch.of(setup, self.goal).system
+        homes = np.array([system.system.read(at.pose) for at in (self.goal, *setup.configurations)])
+        return tuple(islice(starts(system, homes, self.seed, setup), SELECT_ROUNDS))
 
     def ran(self, candidate: Candidate) -> Candidate:
         """The candidate with where its simulated run ends, and what the camera sees along it."""
-        motion, mechanism = self.setting.motion, self.setting.mechanism
+        motion, mechanism = self.setup.motion, self.setup.mechanism
         start, goal = (motion.pose(at.pose(motion.link)) for at in (self.start, self.goal))
         camera = None if mechanism.reference == mechanism.base else mechanism.reference
         try:
             found = (
-                servo(self.setting.robot, candidate.legs, camera, start=start, goal=goal, seed=self.seed)
-                if all(o.by_segment for o in self.setting.observed)
+                servo(self.setup.robot, candidate.legs, camera, start=start, goal=goal, seed=self.seed)
+                if all(o.by_segment for o in self.setup.observed)
                 else servo(self.watching(candidate.legs), start=start, goal=goal, seed=self.seed)
             )
         except HrsynthError as error:
             return replace(candidate, run=Decision("refused", str(error)), discarded=f"the run is refused: {error}")
-        run = Decision(found.ended, found.ending.reason)
+        run = Decision(found.ended, found.run_outcome.reason)
         if found.ended != GOAL:
             return replace(candidate, run=run, discarded=f"the simulated run ends in: {found.ended} ({run.reason})")
         return self.look(replace(candidate, run=run), found.run.configurations)
 
 
-def _singular_at(name: str, posture: Posture) -> str | None:
+def _singular_at(name: str, posture: ConfigurationReport) -> str | None:
     """Why a set is discarded whose hidden robot is singular at the start or the goal, None where it is regular."""
     kind = TYPES.get(posture.hidden.state)
     return None if kind is None else f"the {name} is {kind}"

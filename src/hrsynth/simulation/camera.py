@@ -20,8 +20,8 @@ from ..mechanism.observations.direction import Direction
 from ..results import Value
 from ..tolerances import NUDGE
 from .law import Measures, Poses
-from .mockup import RADIUS
-from .noise import Shocks
+from .mujoco_model import RADIUS
+from .noise import NoiseSamples
 
 VIEWS = 200
 """Places around the legs that are tried for a camera."""
@@ -113,7 +113,7 @@ class Edges(Value):
     reference: str
     rods: tuple[Cylinder, ...]
     pixels: float
-    shocks: Shocks
+    shocks: NoiseSamples
 
     def __call__(self, time: float, poses: Poses, directions: Measures) -> Array:
         """The measured directions (k, 3) in the reference link's frame."""

@@ -22,11 +22,11 @@ from ..budgets import FARTHEST_POSE
 from ..errors import BadRequest, PoseNotReached
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration, measure
-from ..kinematics.platform_motion import Goal, PlatformMotion
-from ..kinematics.relation import Measurement
-from ..kinematics.steps import lead_to
+from ..kinematics.continuation import lead_to
+from ..kinematics.platform_motion import PlatformMotion, PoseTask
+from ..kinematics.velocity_relation import ObservationModel
+from ..mechanism.cameras import CameraObservation, depth_plane
 from ..mechanism.observations.direction import SeenAxis
-from ..mechanism.sights import CameraObservation, depth_plane
 from ..options import option, plain_number
 from ..results import Value
 from ..tolerances import DAMPED
@@ -86,7 +86,7 @@ class Law(Value):
     all are.
     """
 
-    question: Measurement
+    observation_model: ObservationModel
     dof: int
     gain: float
     planes: tuple[Array | None, ...] | None = None
@@ -99,8 +99,8 @@ class Law(Value):
         time: float = 0.0,
     ) -> Command:
         """The command at a configuration (of the joint velocities of its twin)."""
-        every = self.question.observations
-        y, exact = measure_all(configuration, self.question)
+        every = self.observation_model.observations
+        y, exact = measure_all(configuration, self.observation_model)
         wanted, moving = desired
         true = tuple(o.error(value, w) for o, value, w in zip(every, y, wanted, strict=True))
         seen = y if sensed is None else tuple(sensed(time, configuration.pose, y))
@@ -126,11 +126,11 @@ class Law(Value):
         if self.planes is None:
             return rates
         found = list(rates)
-        length = at.twin.length
+        length = at.model.length
         metric = np.repeat([length, 1.0], 3)[:, None]
-        for i, (seen, plane) in enumerate(zip(self.question.observations, self.planes, strict=True)):
+        for i, (seen, plane) in enumerate(zip(self.observation_model.observations, self.planes, strict=True)):
             if plane is not None and isinstance(seen, CameraObservation):
-                links = (seen.seen_from or self.question.reference, seen.link)
+                links = (seen.seen_from or self.observation_model.reference, seen.link)
                 poses, moves = ([each(link) for link in links] for each in (at.pose, at.velocity))
                 found[i] = seen.suppose_plane_rate(plane, *poses, *(metric * V for V in moves))
                 found[i] = found[i] / (length ** np.broadcast_to(seen.dimension, seen.size))[:, None]
@@ -140,14 +140,16 @@ class Law(Value):
         """The least of :meth:`Observation.in_front`."""
         return min(
             (
-                o.in_front(at.pose(o.seen_from or self.question.reference), at.pose(o.link))
-                for o in self.question.observations
+                o.in_front(at.pose(o.seen_from or self.observation_model.reference), at.pose(o.link))
+                for o in self.observation_model.observations
             ),
             default=np.inf,
         )
 
 
-def supposed_planes(text: str, goal: ClosedConfiguration, question: Measurement) -> tuple[Array | None, ...] | None:
+def supposed_planes(
+    text: str, goal: ClosedConfiguration, observation_model: ObservationModel
+) -> tuple[Array | None, ...] | None:
     """The planes of what is seen in images that ``exact``, ``desired`` (those at the goal) or ``constant:0.5`` (that
     depth) means; raises ``BadRequest``."""
     word, _, number = text.partition(":")
@@ -160,10 +162,10 @@ def supposed_planes(text: str, goal: ClosedConfiguration, question: Measurement)
     if depth is not None and not (word == "constant" and 0 < depth <= FARTHEST_POSE):
         raise BadRequest("depth", text, f"{SUPPOSED}, more than 0 and at most {FARTHEST_POSE:g}")
     found: list[Array | None] = []
-    for seen in question.observations:
+    for seen in observation_model.observations:
         plane = None
         if isinstance(seen, CameraObservation):
-            plane = seen.plane_at(goal.pose(seen.seen_from or question.reference), goal.pose(seen.link))
+            plane = seen.plane_at(goal.pose(seen.seen_from or observation_model.reference), goal.pose(seen.link))
         found.append(plane if plane is None or depth is None else depth_plane(np.array([depth])))
     if not any(plane is not None for plane in found):
         raise BadRequest(
@@ -181,15 +183,19 @@ def damped_inverses(values: Array) -> Array:
     return np.asarray(values / (values**2 + damping))
 
 
-def measure_all(configuration: ClosedConfiguration, question: Measurement) -> tuple[tuple[Array, ...], list[Array]]:
+def measure_all(
+    configuration: ClosedConfiguration, observation_model: ObservationModel
+) -> tuple[tuple[Array, ...], list[Array]]:
     """Of each observation the value (size,) and the rates (size, nv)."""
-    _, _, values, rates = measure(configuration.twin, configuration.q, question.reference, question.observations)
+    _, _, values, rates = measure(
+        configuration.model, configuration.q, observation_model.reference, observation_model.observations
+    )
     return tuple(values), rates
 
 
-def directions(configuration: ClosedConfiguration, question: Measurement) -> tuple[Array, list[Array]]:
+def directions(configuration: ClosedConfiguration, observation_model: ObservationModel) -> tuple[Array, list[Array]]:
     """The same where all are directions, (k, 3) and (3, nv)."""
-    values, rates = measure_all(configuration, question)
+    values, rates = measure_all(configuration, observation_model)
     return np.array(values), rates
 
 
@@ -240,33 +246,41 @@ class Trajectory(Value):
 
 
 def straight(
-    start: ClosedConfiguration, motion: PlatformMotion, goal: Goal, question: Measurement, duration: float
+    start: ClosedConfiguration,
+    motion: PlatformMotion,
+    goal: PoseTask,
+    observation_model: ObservationModel,
+    duration: float,
 ) -> tuple[Trajectory, ClosedConfiguration]:
     """The trajectory of the values on the straight way from ``start`` to a goal of the whole pose (where parts of
     the pose depend on each other, along the poses nearest to it), and the configuration at its end; raises
     ``PoseNotReached`` where the way is blocked."""
     X = start.pose(motion.link)
-    every = question.observations
-    here, marks = start, [measure_all(start, question)[0]]
+    every = observation_model.observations
+    here, marks = start, [measure_all(start, observation_model)[0]]
     for fraction in np.linspace(0, 1, POSES + 1)[1:]:
         here, came = lead_to(here, motion, goal.towards(X, float(fraction)), last=fraction == 1)
         if not came:
             at = motion.pose(here.pose(motion.link))
             raise PoseNotReached(
-                start.twin.mechanism.name,
+                start.model.mechanism.name,
                 str(motion.pose(goal_pose(goal))),
                 float(fraction),
                 str(at),
                 origin="the start",
             )
         # an angle goes on where it passes half a turn
-        now = measure_all(here, question)[0]
-        marks.append(tuple(last + o.apart(value, last) for o, value, last in zip(every, now, marks[-1], strict=True)))
+        now = measure_all(here, observation_model)[0]
+        marks.append(
+            tuple(last + o.difference(value, last) for o, value, last in zip(every, now, marks[-1], strict=True))
+        )
     units = tuple(isinstance(o, SeenAxis) for o in every)
-    return Trajectory(np.array([np.concatenate(each) for each in marks]), duration, question.sizes, units), here
+    return Trajectory(
+        np.array([np.concatenate(each) for each in marks]), duration, observation_model.sizes, units
+    ), here
 
 
-def goal_pose(goal: Goal) -> Array:
+def goal_pose(goal: PoseTask) -> Array:
     """The platform pose (4, 4) of a goal of the whole pose."""
     X = np.eye(4)
     X[:3, :3] = goal.zero if goal.rotation is None else goal.rotation

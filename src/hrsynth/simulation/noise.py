@@ -19,14 +19,14 @@ PERIOD = 0.04
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Shocks(Value):
+class NoiseSamples(Value):
     """Random vectors in the unit ball, ``table`` (samples, k, 3), one of them each ``PERIOD``, linear in between, the
     last one from then on."""
 
     table: Array
 
     @classmethod
-    def draw(cls, count: int, horizon: float, seed: int, bias: bool = False) -> Shocks:
+    def draw(cls, count: int, horizon: float, seed: int, bias: bool = False) -> NoiseSamples:
         """Shocks of ``count`` quantities until ``horizon`` (s), uniform in the ball; of a bias only one for each."""
         rng = np.random.default_rng(seed)
         shape = (1 if bias else math.ceil(horizon / PERIOD) + 2, count)
@@ -48,7 +48,7 @@ class Sensors(Value):
 
     observations: tuple[Observation, ...]
     amounts: Mapping[str, float]
-    shocks: Shocks
+    shocks: NoiseSamples
     length: float
 
     @classmethod
@@ -57,7 +57,7 @@ class Sensors(Value):
         camera without a focal length."""
         amounts = noise.amounts_for(observations)
         count = sum(vectors(each) for each in observations)
-        return cls(tuple(observations), amounts, Shocks.draw(count, horizon, seed, noise.bias), length)
+        return cls(tuple(observations), amounts, NoiseSamples.draw(count, horizon, seed, noise.bias), length)
 
     def __call__(self, time: float, poses: Callable[[str], Array], values: Sequence[Array] | Array) -> list[Array]:
         """What is measured where the true values are these."""

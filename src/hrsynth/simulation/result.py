@@ -17,10 +17,10 @@ from ..mechanism.noise import Noise
 from ..mechanism.pose import Pose
 from ..records import DEG, FLAT, MM, As, Record, Recorded, Shown, recorded
 from ..results import Result
-from .ending import Ending
+from .crossings import SingularityTrack, TrackRecord
 from .law import Measures
+from .outcome import RunOutcome
 from .run import Run
-from .track import Track, TrackRecord
 
 ASIDE = 0.9
 """Part of the root mean square distance that a constant one makes up where noise holds a platform aside."""
@@ -54,7 +54,7 @@ class Servo(Result, shown_as="servo"):
     is how far the noisy run stayed from there.
     """
 
-    setting: Annotated[ObservedRobot, FLAT]
+    setup: Annotated[ObservedRobot, FLAT]
     start: Annotated[Pose, As("from")]
     goal: Annotated[Pose, As("to")]
     desired: Measures
@@ -62,8 +62,8 @@ class Servo(Result, shown_as="servo"):
     sense: Annotated[str, Literal["exact", "edges", "pictures"]]
     noise: Noise | None
     run: Run
-    track: Track
-    ending: Annotated[Ending, FLAT]
+    track: SingularityTrack
+    run_outcome: Annotated[RunOutcome, FLAT]
     depth: Recorded[str]
     settled: ClosedConfiguration
     target: ClosedConfiguration
@@ -74,12 +74,12 @@ class Servo(Result, shown_as="servo"):
 
     def headline(self) -> str:
         """The robot and where the run ended."""
-        return f"{self.setting.headline()}: ended at {self.pose}, {self.ended}"
+        return f"{self.setup.headline()}: ended at {self.pose}, {self.outcome}"
 
     @property
-    def ended(self) -> str:
+    def outcome(self) -> str:
         """Where it ended: one of ``ending.ENDINGS``."""
-        return self.ending.name
+        return self.run_outcome.name
 
     @property
     @recorded()
@@ -91,7 +91,7 @@ class Servo(Result, shown_as="servo"):
 
     def pose_of(self, at: ClosedConfiguration) -> Pose:
         """The platform's pose at a configuration."""
-        motion = self.setting.motion
+        motion = self.setup.motion
         return motion.pose(at.pose(motion.link))
 
     @property
@@ -102,7 +102,7 @@ class Servo(Result, shown_as="servo"):
     @property
     def way(self) -> Array:
         """The platform's position, that of its point, along the run, (n, 3)."""
-        motion = self.setting.motion
+        motion = self.setup.motion
         return np.array([motion.position(at.pose(motion.link)) for at in self.run.configurations])
 
     @property
@@ -113,25 +113,25 @@ class Servo(Result, shown_as="servo"):
     @property
     def goal_position(self) -> Array:
         """The position of the platform's point at the goal, (3,)."""
-        motion = self.setting.motion
+        motion = self.setup.motion
         return motion.position(self.target.pose(motion.link))
 
     @property
     def from_goal(self) -> tuple[float, float]:
         """How far the pose at which it ended is from the goal: metres, radians."""
-        motion = self.setting.motion
+        motion = self.setup.motion
         moved = motion.position(self.settled.pose(motion.link)) - self.goal_position
         return float(np.linalg.norm(moved)), self._turn(self.settled)
 
     def _turn(self, at: ClosedConfiguration) -> float:
-        motion = self.setting.motion
+        motion = self.setup.motion
         R = at.pose(motion.link)[:3, :3] @ self.target.pose(motion.link)[:3, :3].T
         return angle_of(R) if motion.body else 0.0
 
     noise_record = Shown(str | None, lambda self: self.noise and str(self.noise), As("noise"))
-    modes = Shown(list[AssemblyMode] | None, lambda self: self.ending.modes and self.ending.modes.modes)
+    modes = Shown(list[AssemblyMode] | None, lambda self: self.run_outcome.modes and self.run_outcome.modes.modes)
     type2 = Shown(TrackRecord, lambda self: self.track.timed(self.run.times))
-    unlimited = Shown(list[str], lambda self: self.setting.unlimited, UNLIMITED)
+    limits_ignored = Shown(list[str], lambda self: self.setup.limits_ignored, UNLIMITED)
     times = Shown(list[float], lambda self: self.run.times, "when (s)")
     error = Shown(list[list[float]], lambda self: self.errors, "the error of each direction at each time")
     poses = Shown(list[Pose], lambda self: [self.pose_of(at) for at in self.run.configurations])

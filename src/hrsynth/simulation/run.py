@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 
 from ..budgets import RUN_AWAY, RUN_EVALUATIONS, WIDEST_CHART
-from ..errors import LoopsNotClosed, NotMeasured
+from ..errors import LoopsNotClosed, UndefinedValue
 from ..geometry.vectors import Array
 from ..kinematics.chart import TangentChart
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.limits import Stops
-from ..kinematics.relation import Measurement
-from ..progress import tell
+from ..kinematics.limits import CoordinateIntervals
+from ..kinematics.velocity_relation import ObservationModel
+from ..progress import report
 from ..results import Value
 from ..tolerances import (
     ARRIVED,
@@ -84,7 +84,7 @@ class Loop(Value):
     motions are all that counts."""
 
     law: Law
-    moving: Measurement
+    moving: ObservationModel
     desired: Desired
     steady: float = 0.0
     sensed: Sense | None = None
@@ -94,7 +94,10 @@ class Loop(Value):
         """Run until it ends by itself, or ``horizon`` (s)."""
         times, found = [0.0], [(start, self._command(0.0, start))]
         stopped, left, longest = None, RUN_EVALUATIONS, np.inf
-        patience, stops = Patience(1 / self.law.gain, 0.0, found[0][1].size), Stops.of(start.twin, start.q)
+        patience, stops = (
+            Patience(1 / self.law.gain, 0.0, found[0][1].size),
+            CoordinateIntervals.of(start.model, start.q),
+        )
         joint = None
         while stopped is None:
             stretch = _Stretch(
@@ -132,13 +135,13 @@ class Loop(Value):
             if found is None or found.growth >= -NEUTRAL_GROWTH * self.law.gain or rate(home) @ found.y <= 0:
                 return None
             return chart.at(found.y, at.q), -1 / found.growth
-        except (LoopsNotClosed, NotMeasured):
+        except (LoopsNotClosed, UndefinedValue):
             return None
 
     def _shift(self, start: ClosedConfiguration, at: ClosedConfiguration) -> float:
         """How far the platform has moved (characteristic lengths)."""
-        link = self.law.question.platform
-        return float(np.linalg.norm(at.pose(link)[:3, 3] - start.pose(link)[:3, 3])) / at.twin.length
+        link = self.law.observation_model.platform
+        return float(np.linalg.norm(at.pose(link)[:3, 3] - start.pose(link)[:3, 3])) / at.model.length
 
     def _command(self, time: float, at: ClosedConfiguration) -> Command:
         return self.law.at(at, self.desired(time), self.sensed, time)
@@ -148,11 +151,17 @@ class _Stretch:
     """One stretch of a run, in one chart; configurations are remembered while the integrator works around them."""
 
     def __init__(
-        self, loop: Loop, chart: TangentChart, start: ClosedConfiguration, left: int, patience: Patience, stops: Stops
+        self,
+        loop: Loop,
+        chart: TangentChart,
+        start: ClosedConfiguration,
+        left: int,
+        patience: Patience,
+        stops: CoordinateIntervals,
     ) -> None:
         self.loop, self.chart, self.near, self.left, self.patience = loop, chart, start.q, left, patience
         self.stops = stops
-        self.least = {name: min(0.0, margin) for name, margin in stops.margins(start.twin, start.q).items()}
+        self.least = {name: min(0.0, margin) for name, margin in stops.margins(start.model, start.q).items()}
         """The least margin of each joint: of one that is beyond its limit, how far it is."""
         self.beyond: str | None = None
         self._memory: dict[tuple[float, bytes], State] = {}
@@ -194,7 +203,7 @@ class _Stretch:
                 else RK23(self.rate, start, y, until, max_step=min(PERIOD, longest), **tolerances)
             )
             while solver.status == "running":
-                tell("run")
+                report("run")
                 solver.step()
                 if solver.status == "failed":
                     return times, states, LOST
@@ -215,7 +224,7 @@ class _Stretch:
                     return times, states, None
         except LoopsNotClosed:
             return times, states, LOST
-        except NotMeasured:
+        except UndefinedValue:
             return times, states, UNMEASURED
         return times, states, TIME if until == horizon else None
 
@@ -238,7 +247,7 @@ class _Stretch:
 
     def _stop_reason(self, at: ClosedConfiguration) -> str | None:
         """What ends a run at a configuration: a joint beyond its limit, something that no camera sees."""
-        past = {name: margin - self.least[name] for name, margin in self.stops.margins(at.twin, at.q).items()}
+        past = {name: margin - self.least[name] for name, margin in self.stops.margins(at.model, at.q).items()}
         first = min(past, key=past.__getitem__, default=None)
         if first is not None and past[first] < 0:
             self.beyond = first
@@ -261,7 +270,7 @@ def _loose(at: ClosedConfiguration, start: ClosedConfiguration) -> bool:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Rest(Value):
+class Standstill(Value):
     """A zero y (n,) of ẏ, and the largest growth of a motion about it (1/s)."""
 
     y: Array
@@ -283,7 +292,7 @@ class Patience:
         return persists
 
 
-def rest_near(rate: Callable[[Array], Array], y: Array) -> Rest | None:
+def rest_near(rate: Callable[[Array], Array], y: Array) -> Standstill | None:
     """The rest next to y (n,) by Newton's method on ẏ = rate(y); None where none was found near."""
     try:
         for _ in range(NEWTON_STEPS):
@@ -297,7 +306,7 @@ def rest_near(rate: Callable[[Array], Array], y: Array) -> Rest | None:
                 return None
             y = y + step
             if size <= RESTED:
-                return Rest(y, float(np.linalg.eigvals(J).real.max()))
+                return Standstill(y, float(np.linalg.eigvals(J).real.max()))
     except LoopsNotClosed:
         return None
     return None

@@ -10,11 +10,11 @@ from typing import Annotated
 import numpy as np
 
 from ..analysis.accuracy.accuracy import sees_all
-from ..analysis.accuracy.cones import IN_SIGHT
-from ..analysis.asked import configurations_at
+from ..analysis.accuracy.measurement_bounds import IN_SIGHT
+from ..analysis.analysis_declaration import analysis
+from ..analysis.configuration_report import REGULAR, UNDECIDED, ConfigurationAnalysis
 from ..analysis.observed import POINTS, CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SeeLike, StartPose
-from ..analysis.posture import REGULAR, UNDECIDED, ConfigurationAnalysis
-from ..analysis.question import analysis
+from ..analysis.pose_requests import configurations_at
 from ..budgets import LONGEST_RUN, RUN_EVALUATIONS
 from ..errors import BadRequest, RankUndecided
 from ..geometry.so3 import angle_of
@@ -27,18 +27,18 @@ from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.observations.point import ImagePoint
 from ..mechanism.pose import PoseLike, asked_pose
 from ..options import option
-from ..progress import tell
+from ..progress import report
 from ..results import by_name
 from ..tolerances import RANK_GAP, SEEN_ABOVE
-from .bench import Bench
 from .camera import Camera, Edges, cylinders, place_camera
-from .ending import EndingClassifier
+from .crossings import track_run
+from .dynamics import DynamicSimulation
 from .law import Depth, FixedDirections, Law, Sense, Trajectory, measure_all, straight, supposed_planes
-from .noise import Sensors, Shocks
-from .pictures import LegRenderer, Pictures, drawing, vision
+from .noise import NoiseSamples, Sensors
+from .outcome import OutcomeClassifier
+from .rendered_images import LegRenderer, RenderedImages, drawing, vision
 from .result import Scatter, Servo
 from .run import AWAY, EFFORT, LIMIT, UNMEASURED, UNSEEN, Loop, Run
-from .track import track_run
 
 GAIN = 0.8
 """λ of MMT 5.1.1."""
@@ -178,11 +178,11 @@ def servo(
     >>> hrsynth.servo("3rrr_m1", start="x=0,y=0,phi=0", goal="x=0.02,y=0,phi=0", gain=0.8)
     <Servo: 3rrr_m1, watching 1, 2, 3: ended at x=0.02,y=0,z=0,phi=0deg, goal>
     """
-    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
+    setup = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
     if conditions.physics or conditions.sense != EXACT:
-        setting.by_segments(f"servo with {'physics' if conditions.physics else f'sense {conditions.sense}'}")
-    task = ServoTask.of(setting, start=start, goal=goal, conditions=conditions, seed=seed)
-    tell("run")
+        setup.by_segments(f"servo with {'physics' if conditions.physics else f'sense {conditions.sense}'}")
+    task = ServoTask.of(setup, start=start, goal=goal, conditions=conditions, seed=seed)
+    report("run")
     return task.run()
 
 
@@ -190,7 +190,7 @@ def servo(
 class ServoTask:
     """A robot that is about to be servoed: its start and goal configurations, its law, what is desired."""
 
-    setting: ObservedRobot
+    setup: ObservedRobot
     start: ClosedConfiguration
     goal: ClosedConfiguration
     law: Law
@@ -201,7 +201,7 @@ class ServoTask:
     @classmethod
     def of(
         cls,
-        setting: ObservedRobot,
+        setup: ObservedRobot,
         *,
         start: PoseLike,
         goal: PoseLike,
@@ -210,40 +210,42 @@ class ServoTask:
     ) -> ServoTask:
         """The task of a request; raises what :func:`servo` raises."""
         wanted = [asked_pose(each) for each in (start, goal)]
-        setting = setting.telling(wanted)
-        require_seen(setting)
-        first, last = configurations_at(setting, wanted)
-        return cls.between(setting, first, last, conditions, seed)
+        setup = setup.telling(wanted)
+        require_seen(setup)
+        first, last = configurations_at(setup, wanted)
+        return cls.between(setup, first, last, conditions, seed)
 
     @classmethod
     def between(
         cls,
-        setting: ObservedRobot,
+        setup: ObservedRobot,
         start: ClosedConfiguration,
         goal: ClosedConfiguration,
         conditions: Conditions = Conditions(),
         seed: int = 0,
     ) -> ServoTask:
         """The same between two configurations."""
-        require_seen(setting)
-        motion, ends = setting.motion, [start, goal]
-        question = setting.samples.question
-        law = Law(question, setting.dof, conditions.gain, supposed_planes(conditions.depth, goal, question))
+        require_seen(setup)
+        motion, ends = setup.motion, [start, goal]
+        observation_model = setup.samples.observation_model
+        law = Law(
+            observation_model, setup.dof, conditions.gain, supposed_planes(conditions.depth, goal, observation_model)
+        )
         for name, at in _name_ends(ends):
-            require_sight(setting, law, name, at)
-        desired: FixedDirections | Trajectory = FixedDirections(measure_all(ends[1], question)[0])
+            require_sight(setup, law, name, at)
+        desired: FixedDirections | Trajectory = FixedDirections(measure_all(ends[1], observation_model)[0])
         if conditions.duration is not None:
             goal_pose = motion.whole(ends[1].pose(motion.link))
-            desired, ends[1] = straight(ends[0], motion, goal_pose, question, conditions.duration)
-        analysis = ConfigurationAnalysis.of(setting)
+            desired, ends[1] = straight(ends[0], motion, goal_pose, observation_model, conditions.duration)
+        analysis = ConfigurationAnalysis.of(setup)
         for name, at in _name_ends(ends):
             require_regular(analysis, name, at)
-        return cls(setting, ends[0], ends[1], law, desired, conditions, seed)
+        return cls(setup, ends[0], ends[1], law, desired, conditions, seed)
 
     @property
     def wanted(self) -> tuple[Array, ...]:
         """The values of the goal."""
-        return measure_all(self.goal, self.law.question)[0]
+        return measure_all(self.goal, self.law.observation_model)[0]
 
     @property
     def directions(self) -> Array:
@@ -257,46 +259,53 @@ class ServoTask:
         loop = self.loop(sensed, smooth=not given.noisy or (given.amount is not None and given.amount.bias))
         if not given.physics:
             return self.result(loop.simulate(self.start, given.horizon))
-        return self.result(*Bench.of(self.setting, self.start).run(loop, given.horizon))
+        return self.result(*DynamicSimulation.of(self.setup, self.start).run(loop, given.horizon))
 
     def loop(self, sensed: Sense | None = None, smooth: bool = True) -> Loop:
         """The closed loop with what is sensed, smoothly or not."""
         return Loop(
-            self.law, self.setting.everything.question, self.desired, self.conditions.duration or 0.0, sensed, smooth
+            self.law,
+            self.setup.all_samples.observation_model,
+            self.desired,
+            self.conditions.duration or 0.0,
+            sensed,
+            smooth,
         )
 
     def sense(self) -> Sense:
         """What measures, and how wrong."""
-        given, question = self.conditions, self.law.question
+        given, observation_model = self.conditions, self.law.observation_model
         noise = given.amount
         if given.sense == EXACT and noise is not None:
-            return Sensors.of(question.observations, noise, given.horizon, self.seed, self.goal.twin.length)
-        mechanism = self.setting.mechanism
-        rods = cylinders(mechanism, question.observations)
-        eye = given.lens or place_camera(rods, question.reference, (self.start.pose, self.goal.pose))
+            return Sensors.of(observation_model.observations, noise, given.horizon, self.seed, self.goal.model.length)
+        mechanism = self.setup.mechanism
+        rods = cylinders(mechanism, observation_model.observations)
+        eye = given.lens or place_camera(rods, observation_model.reference, (self.start.pose, self.goal.pose))
         if given.sense == EDGES:
             edge = noise or Noise(())
-            shocks = Shocks.draw(2 * len(rods), given.horizon, self.seed, edge.bias)
-            return Edges(eye, question.reference, rods, edge.of("px"), shocks)
+            shocks = NoiseSamples.draw(2 * len(rods), given.horizon, self.seed, edge.bias)
+            return Edges(eye, observation_model.reference, rods, edge.of("px"), shocks)
         drawing()
         vision()
-        return Pictures(LegRenderer(mechanism, eye, question.reference, rods))
+        return RenderedImages(LegRenderer(mechanism, eye, observation_model.reference, rods))
 
     def result(self, run: Run, simulated: Array | None = None) -> Servo:
         """What came of a run; ``simulated`` is the displacement (4, 4) of the platform on the physics bench."""
-        setting, motion, given = self.setting, self.setting.motion, self.conditions
+        setup, motion, given = self.setup, self.setup.motion, self.conditions
         still = run
         over = run.stopped in OVER
         if (given.noisy or simulated is not None) and not over:
             # where the loop without noise and dynamics goes on to: its ending is the one that is told
-            still = Loop(self.law, setting.everything.question, FixedDirections(self.wanted)).simulate(
+            still = Loop(self.law, setup.all_samples.observation_model, FixedDirections(self.wanted)).simulate(
                 run.last, LASTS / self.law.gain
             )
-        classifier = EndingClassifier(setting, self.goal, self.wanted)
-        ending = classifier.classify(still, measure_all(still.last, self.law.question)[0])
-        track = track_run(run.configurations, self.law.question, setting.everything.question, setting.dof)
+        classifier = OutcomeClassifier(setup, self.goal, self.wanted)
+        ending = classifier.classify(still, measure_all(still.last, self.law.observation_model)[0])
+        track = track_run(
+            run.configurations, self.law.observation_model, setup.all_samples.observation_model, setup.dof
+        )
         return Servo(
-            setting,
+            setup,
             motion.pose(self.start.pose(motion.link)),
             motion.pose(self.goal.pose(motion.link)),
             self.wanted,
@@ -315,13 +324,13 @@ class ServoTask:
 
     def _notes(self, run: Run, still: Run, simulated: Array | None) -> Iterator[str]:
         """What the run leaves out, and what was measured on the benches."""
-        twin = self.goal.twin
+        model = self.goal.model
         for name, at in (("start", self.start), ("goal", self.goal)):
-            if beyond := outside(twin, at.q):
+            if beyond := outside(model, at.q):
                 yield f"the {name} is beyond the limits of {', '.join(beyond)}"
-        if self.setting.segments and (motors := len(twin.actuated_indices())) < self.setting.dof:
+        if self.setup.segments and (motors := len(model.actuated_indices())) < self.setup.dof:
             yield (
-                f"motors for {motors} of the platform's {self.setting.dof} freedoms: "
+                f"motors for {motors} of the platform's {self.setup.dof} freedoms: "
                 "fewer than the motion that is commanded needs"
             )
         if run.stopped == EFFORT:
@@ -329,26 +338,26 @@ class ServoTask:
         if self.conditions.noisy:
             yield from self._wrong(run)
         if simulated is not None:
-            motion, X = self.setting.motion, simulated @ self.start.pose(self.setting.motion.link)
+            motion, X = self.setup.motion, simulated @ self.start.pose(self.setup.motion.link)
             there = still.last.pose(motion.link)
             apart = 1e3 * float(np.linalg.norm(motion.position(X) - motion.position(there)))
             yield f"the simulated platform stopped {apart:.2g} mm from there"
 
     def _wrong(self, run: Run) -> Iterator[str]:
         """By how much measured values were wrong, in units of the noise; of lines and circles their errors."""
-        every, amount = self.setting.observed, self.conditions.amount
+        every, amount = self.setup.observed, self.conditions.amount
         units = [_unit(o, None if amount is None else dict(amount.amounts).keys()) for o in every]
         for kind in dict.fromkeys(unit for unit in units if unit is not None):
             chosen = [i for i, unit in enumerate(units) if unit == kind]
             off = np.array(
                 [[_off(kind, every[i], each.seen[i], each.true[i]) for i in chosen] for each in run.commands]
-            ) * (self.goal.twin.length if kind == LENGTHS else 1.0)
+            ) * (self.goal.model.length if kind == LENGTHS else 1.0)
             rms = ", ".join(f"{value:.2g}" for value in np.sqrt(np.mean(off**2, axis=0)))
             word, unit = kind
             yield f"measured {word} were wrong by {rms}{unit} root mean square, at most {off.max():.2g}{unit}"
 
     def _scatter(self, run: Run, settled: ClosedConfiguration) -> Scatter:
-        motion = self.setting.motion
+        motion = self.setup.motion
         X = settled.pose(motion.link)
         late = [
             at.pose(motion.link)
@@ -369,13 +378,13 @@ class ServoTask:
         )
 
 
-def require_seen(setting: ObservedRobot) -> None:
+def require_seen(setup: ObservedRobot) -> None:
     """Raise ``BadRequest`` where the observed legs do not see all of the platform's freedoms."""
-    sees_all(setting, "")
-    if any(member.relation.RI for member in setting.samples.members):
+    sees_all(setup, "")
+    if any(member.relation.RI for member in setup.samples.members):
         raise BadRequest(
-            f"{setting.robot.name}: observed links move while the platform rests, there is no interaction matrix",
-            ", ".join(setting.labels),
+            f"{setup.robot.name}: observed links move while the platform rests, there is no interaction matrix",
+            ", ".join(setup.labels),
             "other legs",
         )
 
@@ -410,14 +419,14 @@ def _name_ends(ends: Sequence[ClosedConfiguration]) -> list[tuple[str, ClosedCon
     return list(zip(("start", "goal"), ends, strict=True))[ends[0] is ends[1] :]
 
 
-def require_sight(setting: ObservedRobot, law: Law, name: str, at: ClosedConfiguration) -> None:
+def require_sight(setup: ObservedRobot, law: Law, name: str, at: ClosedConfiguration) -> None:
     """Raise ``BadRequest`` where something that a camera is to see is behind it, or outside of its picture."""
-    for seen in setting.observed:
-        X = at.pose(seen.seen_from or law.question.reference)
+    for seen in setup.observed:
+        X = at.pose(seen.seen_from or law.observation_model.reference)
         if seen.in_front(X, at.pose(seen.link)) < SEEN_ABOVE:
-            pose = setting.motion.pose(at.pose(setting.motion.link))
+            pose = setup.motion.pose(at.pose(setup.motion.link))
             raise BadRequest(
-                f"{setting.robot.name}: {seen.kind} {seen.leg} is not in front of its camera at the {name}",
+                f"{setup.robot.name}: {seen.kind} {seen.leg} is not in front of its camera at the {name}",
                 str(pose),
                 IN_SIGHT,
             )
@@ -426,7 +435,7 @@ def require_sight(setting: ObservedRobot, law: Law, name: str, at: ClosedConfigu
 def require_regular(analysis: ConfigurationAnalysis, name: str, at: ClosedConfiguration) -> None:
     """Raise ``BadRequest`` where a pose is singular."""
     posture = analysis.classify(at)
-    robot, pose = analysis.setting.robot.name, str(posture.pose)
+    robot, pose = analysis.setup.robot.name, str(posture.pose)
     if posture.hidden.state == UNDECIDED:
         raise RankUndecided(f"{robot} at the {name} {pose}", posture.hidden.gap, RANK_GAP)
     if posture.hidden.state != REGULAR:

@@ -25,14 +25,14 @@ def enclosures(case: Case) -> None:
         if dof == 6:
             at = case.text_of(walked[[0]])
     told = case.asked("enclosure", lambda: hrsynth.modes(case.engine, case.observe(), at=at))
-    if told is not None and told.found.continuum is None:
+    if told is not None and told.found.continuous_family is None:
         judge(case, told, at)
 
 
 def judge(case: Case, told: Any, asked: str | None) -> None:
     """Hold the radii of the modes that can be assembled against long doubles."""
     exact = Robot.read(case.path, np.longdouble)
-    items = case.directions(told.setting.observed, exact)
+    items = case.directions(told.setup.observed, exact)
     goal = exact.zero() if asked is None else asked_exactly(case, exact, told, asked)
     if items is None or goal is None:
         case.say("enclosure", UNCLEAR, "the goal is not known in long doubles")

@@ -29,12 +29,12 @@ def endings(case: Case) -> None:
 def judge(case: Case, told: Any) -> None:
     """Hold an ending against an own run."""
     start = case.fitted(told.run.configurations[0])
-    items = case.directions(told.setting.observed)
+    items = case.directions(told.setup.observed)
     if start is None or items is None:
         case.say("ending", UNCLEAR, "the start is not known here")
         return
-    if told.ended not in ("goal", "mode", "antipodal"):
-        case.say("ending", SILENT, told.ended)
+    if told.outcome not in ("goal", "mode", "antipodal"):
+        case.say("ending", SILENT, told.outcome)
         return
     found = run(case, items, start, np.asarray(told.desired, dtype=float), float(told.gain))
     if found is None:
@@ -44,7 +44,7 @@ def judge(case: Case, told: Any) -> None:
     case.say(
         "ending",
         HELD if away < 1e-4 else WRONG,
-        "" if away < 1e-4 else f"{told.ended} at {told.pose}, the own run ends {away:.1e} from there",
+        "" if away < 1e-4 else f"{told.outcome} at {told.pose}, the own run ends {away:.1e} from there",
     )
 
 

@@ -26,7 +26,7 @@ def errors(case: Case) -> None:
 
 def judge(case: Case, told: Any) -> None:
     """Hold the bounds at the zero configuration against errors that are sought."""
-    items = case.directions(told.setting.observed)
+    items = case.directions(told.setup.observed)
     J = None if items is None else inverse_law(case, items, case.robot.zero())
     if J is None or items is None:
         case.say("error bound", UNCLEAR, "the directions do not show the platform clearly at zero")

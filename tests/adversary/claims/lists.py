@@ -48,7 +48,7 @@ def judge(case: Case, told: Any, at: str | None, real: bool) -> None:
         return
     if at is not None:
         asked_of(case, "asked pose", at, told.pose)
-    if told.found.continuum is not None:
+    if told.found.continuous_family is not None:
         case.say("modes", SILENT, "a continuum")
         return
     search = Search.of(case, told, goal, real)
@@ -111,7 +111,7 @@ class Search:
                     return None
                 free[found] = False
             return cls(case, goal, things(robot, []), free, turned)
-        measured = case.directions(told.setting.observed)
+        measured = case.directions(told.setup.observed)
         return None if measured is None else cls(case, goal, measured, free, turned)
 
     def all(self, count: int = STARTS) -> State:
@@ -216,7 +216,7 @@ def assembled(case: Case, told: Any, mode: Any, search: Search, found: State) ->
         good = float(np.max(np.abs(rows), initial=0.0)) < 1e-6 and away < 1e-5
         off = f"{mode.pose}: does not close there, {np.max(np.abs(rows)):.1e}, pose off by {away:.1e}"
         case.say("assembled", HELD if good else WRONG, "" if good else off)
-    elif word == "no" and not mode.beyond:
+    elif word == "no" and not mode.beyond_limits:
         x, R = matrix_of(mode.pose)
         there = (
             any(apart(case, mode.pose, found[[k]]) < 1e-5 for k in range(len(found))) or len(search.at_pose(x, R)) > 0

@@ -14,14 +14,14 @@ def loci(case: Case) -> None:
     """``singular`` with few random poses."""
     import hrsynth
 
-    told = case.asked("singular", lambda: hrsynth.singular(case.engine, case.observe(), points=20))
+    told = case.asked("singular", lambda: hrsynth.singularities(case.engine, case.observe(), points=20))
     if told is not None:
         judge(case, told)
 
 
 def judge(case: Case, told: Any) -> None:
     """Hold the singular poses, *never* and *always* against singular values of the own Jacobians."""
-    items = case.directions(told.setting.observed)
+    items = case.directions(told.setup.observed)
     if items is None:
         case.say("singular", UNCLEAR, "a measurement is no direction of a link")
         return

@@ -58,7 +58,7 @@ def judge(case: Case, told: Any, asked: str) -> None:
     posture = told.postures[0]
     asked_of(case, "asked pose", asked, posture.pose)
     at = case.fitted(posture.configuration)
-    items = case.directions(told.setting.observed)
+    items = case.directions(told.setup.observed)
     if at is None:
         case.say("ranks there", WRONG, f"the configuration at {posture.pose} does not close (asked {asked})")
         return

@@ -22,7 +22,7 @@ def rewritten(case: Case) -> None:
     told = case.asked("hidden robot", lambda: hrsynth.derive(case.engine, case.observe()))
     if told is None:
         return
-    own = generic(case, case.directions(told.setting.observed))
+    own = generic(case, case.directions(told.setup.observed))
     if not isinstance(own, str):
         good = own == (told.dof, told.verdict.rank)
         case.say(
@@ -40,7 +40,7 @@ def judge(case: Case, told: Any, path: Path) -> None:
     """Hold the relation of a hidden robot's file against the real robot's."""
     hidden = Robot.read(path)
     study = Study(hidden, case.robot.point)
-    observed = told.setting.observed
+    observed = told.setup.observed
     if any(o.link not in hidden.links for o in observed):
         case.say("hidden robot", UNCLEAR, "an observed link is gone")
         return

@@ -18,5 +18,5 @@ CLAIMS: dict[str, tuple[Callable[[Case], None], float]] = {
     "hidden robot": (rewritten.rewritten, 0.1),
     "paths": (ways.ways, 0.06),
     "singularities": (loci.loci, 0.015),
-    "endings": (endings.endings, 0.03),
+    "equilibria": (endings.endings, 0.03),
 }

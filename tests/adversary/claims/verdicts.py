@@ -44,7 +44,7 @@ def verdicts(case: Case) -> None:
     seen = case.asked("check", lambda: hrsynth.check(case.engine))
     if told is None or seen is None:
         return
-    segments = {each.leg: each for each in seen.setting.segments}
+    segments = {each.leg: each for each in seen.setup.segments}
     case.enough = told.minimal
     judge(case, told, segments)
     if case.rng.random() < 0.1:
@@ -87,7 +87,7 @@ def judge_cures(case: Case, told: object, sets: Iterable[object]) -> None:
         case.say("cure", UNCLEAR, "small steps do not lead away from zero")
         return
     here = case.study.locals(at)
-    observed = list(told.setting.observed)  # type: ignore[attr-defined]
+    observed = list(told.setup.observed)  # type: ignore[attr-defined]
     for each in sets:
         measured = [*observed, *(m.observation for m in each.measurements)]  # type: ignore[attr-defined]
         names = ", ".join(f"{m.kind} of {m.of}" for m in each.measurements)  # type: ignore[attr-defined]

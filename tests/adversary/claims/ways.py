@@ -40,7 +40,7 @@ def ways(case: Case) -> None:
 def judge(case: Case, told: Any) -> None:
     """Hold a verdict about two poses against small steps."""
     start, goal = case.fitted(told.start.configuration), case.fitted(told.goal.configuration)
-    items = case.directions(told.setting.observed)
+    items = case.directions(told.setup.observed)
     if start is None or goal is None:
         case.say("path", WRONG, "an end does not close")
     elif items is None:
@@ -59,7 +59,7 @@ def same(case: Case, told: Any, start: State, goal: State, items: Items) -> None
         case.say("path", UNCLEAR, "through other working modes")
         return
     at, least, motion = start, np.inf, told.coordinates.motion
-    for way in told.ways:
+    for way in told.segments:
         angle = float(np.linalg.norm(way.turn))
 
         def place(part: float, way: Any = way, angle: float = angle) -> tuple[Array, Array]:

@@ -12,15 +12,15 @@ from hypothesis import HealthCheck, assume, given, settings
 from matplotlib.figure import Figure
 
 from hrsynth.analysis.accuracy.accuracy import Accuracy, accuracy, errors_at, sees_all
-from hrsynth.analysis.accuracy.cones import Blur, half_angles
 from hrsynth.analysis.accuracy.error_map import Mapper
+from hrsynth.analysis.accuracy.measurement_bounds import MeasurementBounds, half_angles
+from hrsynth.analysis.accuracy.nonlinear_check import true_errors
 from hrsynth.analysis.accuracy.pose_errors import _descend, _width, error_axes, largest_by_ascent, reading
-from hrsynth.analysis.accuracy.sampled import true_errors
 from hrsynth.analysis.accuracy.singular_search import singular_poses
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.batch.reach import sweep
+from hrsynth.batch.pose_continuation import sweep
 from hrsynth.description import load
-from hrsynth.errors import BadRequest, HrsynthError, PlaneNotMet, PoseNotReached
+from hrsynth.errors import BadRequest, HrsynthError, NoReachablePose, PoseNotReached
 from hrsynth.geometry.vectors import Array
 from hrsynth.mechanism.pose import Grid
 from hrsynth.present.maps import _error_entries, _locus
@@ -99,11 +99,11 @@ def test_a_map_is_the_closed_form(legs: str) -> None:
     assert field.spots.difference < 1e-8
 
 
-def check_extents(setting: ObservedRobot, cones: Array) -> None:
+def check_extents(setup: ObservedRobot, cones: Array) -> None:
     """The extremes are attained by the directions that are told, and no random errors in the cones do worse."""
-    for at in setting.configurations[:2]:
-        errors = errors_at(setting, Blur(cones), at)
-        rates, twists = reading(at, setting.samples.question)
+    for at in setup.configurations[:2]:
+        errors = errors_at(setup, MeasurementBounds(cones), at)
+        rates, twists = reading(at, setup.samples.observation_model)
         inverse = np.linalg.pinv(rates, rcond=1e-7)
         rng = np.random.default_rng(1)
         tries = rng.normal(size=(400, len(cones), 3))
@@ -133,9 +133,9 @@ def check_extents(setting: ObservedRobot, cones: Array) -> None:
 @pytest.mark.some(3)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_extremes_are_attained_and_not_exceeded(robot: str) -> None:
-    setting = ObservedRobot.of(load(robot), samples=3)
-    cones = CONE * (1 + np.arange(len(setting.observed)) / 3)
-    check_extents(setting, cones)
+    setup = ObservedRobot.of(load(robot), samples=3)
+    cones = CONE * (1 + np.arange(len(setup.observed)) / 3)
+    check_extents(setup, cones)
 
 
 @pytest.mark.parametrize("cones", ["0.1deg", "1=0.1deg,2=0.2deg,3=0.1deg,4=0.3deg,5=0.1deg,6=0.1deg"])
@@ -143,7 +143,7 @@ def test_a_bound_that_may_be_too_large_is_told_to_be_one(cones: str) -> None:
     """Of six cones the text says how far each number may be above what the errors that are told attain."""
     found = accuracy("gough_stewart", cone=cones)
     lines = runs.accuracy(found).splitlines()
-    rates, twists = reading(found.setting.everything.start, found.setting.samples.question)
+    rates, twists = reading(found.setup.all_samples.start, found.setup.samples.observation_model)
     J = twists @ np.linalg.pinv(rates, rcond=1e-7)
     for word, extent, rows in (
         ("position", found.poses[0].position, J[:3]),
@@ -162,22 +162,22 @@ def test_a_bound_that_may_be_too_large_is_told_to_be_one(cones: str) -> None:
 @pytest.mark.slow
 def test_extremes_of_random_robots(robot) -> None:
     try:
-        setting = ObservedRobot.of(robot, samples=3)
+        setup = ObservedRobot.of(robot, samples=3)
     except HrsynthError:
         assume(False)
-    check_extents(setting, np.full(len(setting.observed), CONE))
+    check_extents(setup, np.full(len(setup.observed), CONE))
 
 
 @pytest.mark.some(1)
 @pytest.mark.parametrize("robot", ["quattro", "3rrr_m1", "gough_stewart", "orthoglide", "delta"])
 def test_samples_approach_the_linear_maxima_as_cones_shrink(robot: str) -> None:
-    setting = ObservedRobot.of(load(robot), samples=3)
-    question, start = setting.samples.question, setting.everything.start
+    setup = ObservedRobot.of(load(robot), samples=3)
+    observation_model, start = setup.samples.observation_model, setup.all_samples.start
     away = []
     for cone in (2e-3, 1e-3):
-        cones = np.full(len(setting.observed), cone)
-        errors = errors_at(setting, Blur(cones), start)
-        true = true_errors(start, question, setting.motion, Blur(cones), errors, 8)
+        cones = np.full(len(setup.observed), cone)
+        errors = errors_at(setup, MeasurementBounds(cones), start)
+        true = true_errors(start, observation_model, setup.motion, MeasurementBounds(cones), errors, 8)
         assert true.missed == 0
         away.append(abs(true.position - errors.position.largest) / errors.position.largest)
     assert away[1] < 0.02
@@ -203,8 +203,8 @@ def test_cones_of_their_own_scale_their_legs() -> None:
 
 
 def test_a_grid_by_the_batch_is_that_by_pinocchio() -> None:
-    setting = ObservedRobot.of(load("quattro"), "1,3,4")
-    mapper = Mapper(setting, Blur(np.full(3, CONE)))
+    setup = ObservedRobot.of(load("quattro"), "1,3,4")
+    mapper = Mapper(setup, MeasurementBounds(np.full(3, CONE)))
     grid = Grid.parse("x=-0.2:0.2:4,phi=-10deg:20deg:3,y=0.05,z=-0.7")
     quick, slow = mapper.over(grid, 0), mapper._one_by_one(grid)
     assert quick.position.ravel() == pytest.approx(slow.position, rel=1e-8)
@@ -244,9 +244,11 @@ def test_a_grid_says_that_its_bounds_may_be_too_large(name: str, grid: str) -> N
     assert (field.spots is None) == (name == "3rps")
     assert field.gap > 1e-3
     assert "three cones or more: upper bounds, nowhere more than" in runs.accuracy(found)
-    starts = sweep(found.setting.everything.start, found.setting.everything.question, field.grid, found.setting.motion)
+    starts = sweep(
+        found.setup.all_samples.start, found.setup.all_samples.observation_model, field.grid, found.setup.motion
+    )
     for k, at in enumerate(starts):
-        met = largest_by_ascent(at, found.setting.samples.question, found.blur)
+        met = largest_by_ascent(at, found.setup.samples.observation_model, found.bounds)
         for mine, theirs in zip((field.position.flat[k], field.orientation.flat[k]), met, strict=True):
             assert mine / (1 + field.gap) * (1 - 1e-6) <= theirs <= mine * (1 + 1e-6)
 
@@ -315,7 +317,7 @@ def test_the_pose_that_a_grid_holds_is_told_whole(robot: str, grid: str) -> None
 def legend(found: Accuracy) -> list[str]:
     """The words of the legend of a map of errors."""
     assert found.field is not None
-    plane = MapPlane.of(found.field.grid.axes, found.setting.motion, 0.4, 1.6)
+    plane = MapPlane.of(found.field.grid.axes, found.setup.motion, 0.4, 1.6)
     drawn = found.field.grid.ndim == 2 and _locus(found.field, [Figure().subplots()], plane)
     return [each.get_label() for each in _error_entries(found.field, drawn)]
 
@@ -352,17 +354,17 @@ def test_bad_requests(legs: str, cones: str | bool, options: dict, word: str) ->
 def test_poses_and_planes_out_of_reach() -> None:
     with pytest.raises(PoseNotReached):
         accuracy(load("quattro"), "1,4", cone=CONE, at=["x=3"])
-    with pytest.raises(PlaneNotMet):
+    with pytest.raises(NoReachablePose):
         accuracy(load("quattro"), "1,4", cone=CONE, plane="z=3")
-    with pytest.raises(PlaneNotMet):
+    with pytest.raises(NoReachablePose):
         accuracy(load("quattro"), "1,4", cone=CONE, grid="x=3:4:3,y=0,z=-0.7")
 
 
 def test_cones_by_link_and_by_leg() -> None:
-    setting = ObservedRobot.of(load("quattro"), "1,4", samples=2)
-    sees_all(setting)
-    link = setting.observed[0].link
-    assert half_angles({link: 0.1, "4": 0.2}, setting.observed).tolist() == [0.1, 0.2]
+    setup = ObservedRobot.of(load("quattro"), "1,4", samples=2)
+    sees_all(setup)
+    link = setup.observed[0].link
+    assert half_angles({link: 0.1, "4": 0.2}, setup.observed).tolist() == [0.1, 0.2]
 
 
 def test_the_least_error_is_the_least_of_many_directions() -> None:
@@ -386,16 +388,16 @@ def test_the_least_error_is_the_least_of_many_directions() -> None:
 @pytest.mark.some(1)
 @pytest.mark.parametrize("name", ["quattro", "3rrr_m1", "3rps", "prrrp_parallel", "gough_stewart"])
 def test_what_an_ascent_attains_lies_between_the_two_bounds(name: str):
-    setting = ObservedRobot.of(name)
-    cones = np.full(len(setting.observed), 1e-3)
-    for at in (setting.everything.start, *setting.configurations[:4]):
-        found = largest_by_ascent(at, setting.samples.question, Blur(cones))
-        bounds = errors_at(setting, Blur(cones), at)
+    setup = ObservedRobot.of(name)
+    cones = np.full(len(setup.observed), 1e-3)
+    for at in (setup.all_samples.start, *setup.configurations[:4]):
+        found = largest_by_ascent(at, setup.samples.observation_model, MeasurementBounds(cones))
+        bounds = errors_at(setup, MeasurementBounds(cones), at)
         for bound, met in zip((bounds.position, bounds.orientation), found, strict=True):
             assert np.isinf(met) == np.isinf(bound.largest)
             if np.isfinite(met):
                 assert (1 - bound.gap) * bound.largest * (1 - 1e-6) <= met <= bound.largest * (1 + 1e-9) + 1e-15
-        axes = error_axes(at, setting.samples.question, Blur(cones))
+        axes = error_axes(at, setup.samples.observation_model, MeasurementBounds(cones))
         assert (axes is None) == np.isinf(found[0])
         if axes is not None:
             assert np.linalg.norm(axes[0]) == pytest.approx(found[0], rel=1e-9)
@@ -406,9 +408,11 @@ def test_what_an_ascent_attains_lies_between_the_two_bounds(name: str):
 def test_a_grid_says_that_parts_of_its_poses_depend_on_each_other() -> None:
     """Roll and pitch of a 3-RPS decide its yaw (Huang); three coordinates of its point that are too far do not depend,
     nor do two of a five-bar's."""
-    with pytest.raises(PlaneNotMet, match="3 freedoms, and at zero and at a random configuration parts of these poses"):
+    with pytest.raises(
+        NoReachablePose, match="3 freedoms, and at zero and at a random configuration parts of these poses"
+    ):
         accuracy(load("3rps"), cone=CONE, grid="z=0.3:0.4:3,rpy=0.1/0.05/0")
     for robot, grid in (("3rps", "x=5:6:3,y=5,z=0.9"), ("rrrrr_m1", "x=50:60:3,y=50")):
-        with pytest.raises(PlaneNotMet) as refused:
+        with pytest.raises(NoReachablePose) as refused:
             accuracy(load(robot), cone=CONE, grid=grid)
         assert "depend" not in str(refused.value)

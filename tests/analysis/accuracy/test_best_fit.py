@@ -13,10 +13,10 @@ from scipy.optimize import minimize
 
 from hrsynth.analysis.accuracy.accuracy import Accuracy, accuracy
 from hrsynth.analysis.accuracy.best_fit import ENDS, FIT, Fit, best_fits, observed_values, weakest
-from hrsynth.analysis.accuracy.cones import tilt
-from hrsynth.analysis.accuracy.sampled import _tangents
+from hrsynth.analysis.accuracy.measurement_bounds import tilt
+from hrsynth.analysis.accuracy.nonlinear_check import _tangents
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.batch.reach import reach
+from hrsynth.batch.pose_continuation import reach
 from hrsynth.description import load
 from hrsynth.errors import HrsynthError
 from hrsynth.geometry.vectors import Array, pose, rotation_about, unit
@@ -73,7 +73,7 @@ def test_best_fits_far_from_singularities_are_followed() -> None:
     true = told("1,2", "x=0.1,y=0.1,z=-0.7").sampled[0]
     assert true is not None
     assert (true.missed, round(1e3 * true.position, 1)) == (0, 163.2)
-    assert true.weakest > 0.12 > 0.1 * true.usual
+    assert true.smallest_singular_value > 0.12 > 0.1 * true.usual
 
 
 @pytest.mark.slow
@@ -82,12 +82,12 @@ def test_what_ends_is_no_singularity() -> None:
     true = told("3,4", "x=0.15,y=0.2,z=-0.75").sampled[0]
     assert true is not None
     assert (len(true.ended), true.not_found) == (2, 0)
-    assert true.weakest > 0.11
+    assert true.smallest_singular_value > 0.11
 
 
-def ways(setting: ObservedRobot, at: ClosedConfiguration, cone: float, count: int, seed: int) -> list[Array]:
+def ways(setup: ObservedRobot, at: ClosedConfiguration, cone: float, count: int, seed: int) -> list[Array]:
     rng = np.random.default_rng(seed)
-    u = np.array(observed_values(at, setting.samples.question)[0])
+    u = np.array(observed_values(at, setup.samples.observation_model)[0])
     return [cone * _tangents(rng, u) for _ in range(count)]
 
 
@@ -101,54 +101,56 @@ def ways(setting: ObservedRobot, at: ClosedConfiguration, cone: float, count: in
 )
 def test_best_fits_are_those_of_the_closed_form(legs: str, at: str, chosen: list[int]) -> None:
     """Among the ways of the samples above; where no curve of best fits goes on (13, 29), the minimiser jumps."""
-    setting = ObservedRobot.of(load("quattro_rigid"), legs)
-    here = reach(setting.everything.start, setting.everything.question, Pose.parse(at), setting.motion)
+    setup = ObservedRobot.of(load("quattro_rigid"), legs)
+    here = reach(setup.all_samples.start, setup.all_samples.observation_model, Pose.parse(at), setup.motion)
     numbers = [int(leg) - 1 for leg in legs.split(",")]
-    P = setting.motion.position(here.pose(setting.motion.link))
-    u = np.array(observed_values(here, setting.samples.question)[0])
+    P = setup.motion.position(here.pose(setup.motion.link))
+    u = np.array(observed_values(here, setup.samples.observation_model)[0])
     assert np.allclose(u, directions(P, numbers), atol=1e-9)
-    drawn = ways(setting, here, math.radians(2), 30, 0)
+    drawn = ways(setup, here, math.radians(2), 30, 0)
     for way in (drawn[i] for i in chosen):
-        fit = best_fits(here, setting.samples.question, lambda part, way=way: tilt(u, part * way))
+        fit = best_fits(here, setup.samples.observation_model, lambda part, way=way: tilt(u, part * way))
         found, smooth = rested(P, numbers, way, 40)
         assert fit.outcome == (FIT if smooth else ENDS)
         if smooth:
-            assert np.allclose(found, setting.motion.position(fit.way[-1].pose(setting.motion.link)), atol=2e-5)
+            assert np.allclose(found, setup.motion.position(fit.way[-1].pose(setup.motion.link)), atol=2e-5)
 
 
-def check_fit(setting: ObservedRobot, at: ClosedConfiguration, way: Array) -> Fit:
+def check_fit(setup: ObservedRobot, at: ClosedConfiguration, way: Array) -> Fit:
     """A fit is where the loop rests whose desired directions are the wrong ones, and nothing next to it fits better;
     where there is none, that is no claim about the robot."""
-    question, link = setting.samples.question, setting.motion.link
-    u = np.array(observed_values(at, question)[0])
-    fit = best_fits(at, question, lambda part: tilt(u, part * way))
-    assert fit.weakest <= weakest(at, question) * (1 + 1e-9)
+    observation_model, link = setup.samples.observation_model, setup.motion.link
+    u = np.array(observed_values(at, observation_model)[0])
+    fit = best_fits(at, observation_model, lambda part: tilt(u, part * way))
+    assert fit.weakest <= weakest(at, observation_model) * (1 + 1e-9)
     if fit.outcome != FIT:
         return fit
     assert fit.reached == 1.0
     wanted, there = tilt(u, way), fit.way[-1]
 
     def size(here: ClosedConfiguration) -> float:
-        return float(np.sum(np.cross(np.array(observed_values(here, question)[0]), wanted) ** 2))
+        return float(np.sum(np.cross(np.array(observed_values(here, observation_model)[0]), wanted) ** 2))
 
     rng = np.random.default_rng(0)
     for _ in range(10):
         kernel, _ = there.kernel()
-        q, residual = solve(there.twin, there.twin.integrate(there.q, 1e-3 * kernel @ rng.normal(size=kernel.shape[1])))
+        q, residual = solve(
+            there.model, there.model.integrate(there.q, 1e-3 * kernel @ rng.normal(size=kernel.shape[1]))
+        )
         if residual < 1e-10:
-            assert size(ClosedConfiguration.of(there.twin, q)) >= size(there) - 1e-12
-    loop = Loop(Law(question, setting.dof, 0.8), setting.everything.question, FixedDirections(wanted))
+            assert size(ClosedConfiguration.of(there.model, q)) >= size(there) - 1e-12
+    loop = Loop(Law(observation_model, setup.dof, 0.8), setup.all_samples.observation_model, FixedDirections(wanted))
     run = loop.simulate(at, 200.0)
-    assert np.allclose(run.last.pose(link), there.pose(link), atol=1e-4 * max(1.0, there.twin.length))
+    assert np.allclose(run.last.pose(link), there.pose(link), atol=1e-4 * max(1.0, there.model.length))
     return fit
 
 
 @pytest.mark.some(1)
 @pytest.mark.parametrize("robot", ["3rps", "gough_stewart", "rrrrr_m1", "orthoglide", "quattro", "delta"])
 def test_best_fits_are_where_the_loop_rests(robot: str) -> None:
-    setting = ObservedRobot.of(load(robot), samples=3)
-    at = setting.everything.start
-    assert [check_fit(setting, at, way).outcome for way in ways(setting, at, 5e-3, 2, 1)] == [FIT] * 2
+    setup = ObservedRobot.of(load(robot), samples=3)
+    at = setup.all_samples.start
+    assert [check_fit(setup, at, way).outcome for way in ways(setup, at, 5e-3, 2, 1)] == [FIT] * 2
 
 
 @pytest.mark.slow
@@ -156,13 +158,13 @@ def test_best_fits_are_where_the_loop_rests(robot: str) -> None:
 @given(parallel_robots())
 def test_best_fits_of_random_robots(robot) -> None:
     try:
-        setting = ObservedRobot.of(robot, samples=3)
+        setup = ObservedRobot.of(robot, samples=3)
     except HrsynthError:
         assume(False)
-    at = setting.configurations[0]
-    assume(weakest(at, setting.samples.question) > 0.1)
-    for way in ways(setting, at, 2e-3, 2, 1):
-        check_fit(setting, at, way)
+    at = setup.configurations[0]
+    assume(weakest(at, setup.samples.observation_model) > 0.1)
+    for way in ways(setup, at, 2e-3, 2, 1):
+        check_fit(setup, at, way)
 
 
 @pytest.mark.slow
@@ -185,7 +187,7 @@ def test_an_arm_that_hardly_sees_one_of_its_turns_is_followed_to_the_whole_error
     found = accuracy(
         b.build(platform="l6"), camera="hand=l6@0,0,0/0,0,0/800", see=sights, noise="0.3px,1mm", nonlinear=4
     )
-    (linear,), (true,), length = found.poses, found.sampled, found.setting.mechanism.length
+    (linear,), (true,), length = found.poses, found.sampled, found.setup.mechanism.length
 
     def displaced(q: Array) -> Array:
         D = np.eye(4)

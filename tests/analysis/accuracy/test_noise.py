@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 import hrsynth
 from hrsynth.analysis.accuracy.accuracy import errors_at
-from hrsynth.analysis.accuracy.cones import Blur
+from hrsynth.analysis.accuracy.measurement_bounds import MeasurementBounds
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.so3 import logarithm
@@ -76,16 +76,16 @@ def values(at: ClosedConfiguration, observed: tuple[Observation, ...], reference
     return [o.value(at.pose(o.seen_from or reference), at.pose(o.link)) for o in observed]
 
 
-def scales(setting: ObservedRobot) -> list[Array]:
-    return [setting.everything.twin.length ** np.broadcast_to(o.dimension, o.size) for o in setting.observed]
+def scales(setup: ObservedRobot) -> list[Array]:
+    return [setup.all_samples.model.length ** np.broadcast_to(o.dimension, o.size) for o in setup.observed]
 
 
-def explained(setting: ObservedRobot, at: ClosedConfiguration, wrong: list[Array]) -> ClosedConfiguration:
+def explained(setup: ObservedRobot, at: ClosedConfiguration, wrong: list[Array]) -> ClosedConfiguration:
     """The configuration that explains values best: least squares of the errors that a loop feeds back, by Gauss and
     Newton with differences, over the motions of the loops."""
-    observed, reference = setting.observed, setting.mechanism.reference
-    chart = TangentChart.around(at, setting.samples.question)
-    unit = scales(setting)
+    observed, reference = setup.observed, setup.mechanism.reference
+    chart = TangentChart.around(at, setup.samples.observation_model)
+    unit = scales(setup)
 
     def errors(y: Array) -> Array:
         found = values(chart.at(y, at.q), observed, reference)
@@ -99,26 +99,26 @@ def explained(setting: ObservedRobot, at: ClosedConfiguration, wrong: list[Array
     return chart.at(y, at.q)
 
 
-def moved(setting: ObservedRobot, at: ClosedConfiguration, there: ClosedConfiguration) -> tuple[Array, Array]:
+def moved(setup: ObservedRobot, at: ClosedConfiguration, there: ClosedConfiguration) -> tuple[Array, Array]:
     """The platform's displacement: of its point (m), its turn (rad)."""
-    motion = setting.motion
+    motion = setup.motion
     X, Y = (each.pose(motion.link) for each in (at, there))
     turn = logarithm(Y[:3, :3] @ X[:3, :3].T) if motion.body else np.zeros(3)
     return motion.position(Y) - motion.position(X), turn
 
 
-def shocks(blur: Blur, setting: ObservedRobot, at: ClosedConfiguration, way: Array) -> Array:
+def shocks(blur: MeasurementBounds, setup: ObservedRobot, at: ClosedConfiguration, way: Array) -> Array:
     """The random vectors (k, 2, 3) of a way (balls, 3)."""
-    found = np.zeros((len(setting.observed), 2, 3))
-    for (i, number), each in zip(blur.at(at, setting.samples.question).balls, way, strict=True):
+    found = np.zeros((len(setup.observed), 2, 3))
+    for (i, number), each in zip(blur.at(at, setup.samples.observation_model).balls, way, strict=True):
         found[i, number] = each / (blur.cones[i] or 1.0)
     return found
 
 
-def sensed(setting: ObservedRobot, blur: Blur, at: ClosedConfiguration, given: Array) -> list[Array]:
+def sensed(setup: ObservedRobot, blur: MeasurementBounds, at: ClosedConfiguration, given: Array) -> list[Array]:
     """What the simulated sensors give for random vectors."""
-    true = values(at, setting.observed, setting.mechanism.reference)
-    every = enumerate(zip(setting.observed, true, given, strict=True))
+    true = values(at, setup.observed, setup.mechanism.reference)
+    every = enumerate(zip(setup.observed, true, given, strict=True))
     return [o.sense(value, shock, blur.own(i, o)) for i, (o, value, shock) in every]
 
 
@@ -132,24 +132,24 @@ SLOW = pytest.mark.slow
 )
 def test_no_wrong_measurement_does_worse_and_the_told_one_does_it(name: str, tmp_path: Path) -> None:
     """The law: to first order the largest error over all noise is the told one, between its bounds."""
-    setting = robot(name, tmp_path)
-    at = setting.everything.start
-    units = sorted(frozenset().union(*(o.found_by for o in setting.observed)))
+    setup = robot(name, tmp_path)
+    at = setup.all_samples.start
+    units = sorted(frozenset().union(*(o.found_by for o in setup.observed)))
     noise = ",".join({"px": "0.003px", "m": "0.01mm", "rad": "0.001deg"}[unit] for unit in units)
-    blur = Blur.of(None, noise, setting.observed)
-    errors = errors_at(setting, blur, at)
+    blur = MeasurementBounds.of(None, noise, setup.observed)
+    errors = errors_at(setup, blur, at)
     rng = np.random.default_rng(2)
-    tries = rng.normal(size=(12, len(setting.observed), 2, 3))
+    tries = rng.normal(size=(12, len(setup.observed), 2, 3))
     tries /= np.linalg.norm(tries, axis=3, keepdims=True)
-    off = [moved(setting, at, explained(setting, at, sensed(setting, blur, at, each))) for each in tries]
+    off = [moved(setup, at, explained(setup, at, sensed(setup, blur, at, each))) for each in tries]
     for part, told in enumerate((errors.position, errors.orientation)):
         sizes = [float(np.linalg.norm(each[part])) for each in off]
         assert max(sizes) <= told.largest * (1 + 1e-3) + 1e-12
         if told.errors is None:
             assert max(sizes) < 1e-9
             continue
-        worst = shocks(blur, setting, at, told.errors)
-        reached = moved(setting, at, explained(setting, at, sensed(setting, blur, at, worst)))[part]
+        worst = shocks(blur, setup, at, told.errors)
+        reached = moved(setup, at, explained(setup, at, sensed(setup, blur, at, worst)))[part]
         assert told.largest * (1 - told.gap - 2e-3) <= np.linalg.norm(reached) <= told.largest * (1 + 1e-3)
         assert told.direction is not None
         assert abs(reached @ told.direction) == pytest.approx(np.linalg.norm(reached), rel=0.05)
@@ -158,12 +158,12 @@ def test_no_wrong_measurement_does_worse_and_the_told_one_does_it(name: str, tmp
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["point", "mixture"])
 def test_a_loop_whose_sensors_are_wrong_all_along_comes_to_rest_within_the_bound(name: str, tmp_path: Path) -> None:
-    setting, pose = robot(name, tmp_path), "x=0.1,y=0.05,z=1.2,rpy=0/0/0"
+    setup, pose = robot(name, tmp_path), "x=0.1,y=0.05,z=1.2,rpy=0/0/0"
     start = "x=0.12,y=0.03,z=1.25,rpy=0.02/0.01/0.03"
     noise = "0.3px" if name == "point" else NOISE
-    (errors,) = hrsynth.accuracy(setting, noise=noise, at=pose).poses
+    (errors,) = hrsynth.accuracy(setup, noise=noise, at=pose).poses
     for seed in range(3):
-        found = hrsynth.servo(setting, start=start, goal=pose, noise=noise, bias=True, seed=seed)
+        found = hrsynth.servo(setup, start=start, goal=pose, noise=noise, bias=True, seed=seed)
         X = found.run.last.pose("platform")
         off = float(np.linalg.norm(X[:3, 3] - np.array([0.1, 0.05, 1.2])))
         assert 0.01 * errors.position.largest < off < errors.position.largest * 1.02
@@ -187,9 +187,9 @@ def test_cones_of_directions_are_their_noise(tmp_path: Path) -> None:
         hrsynth.accuracy("quattro", "1,4", cone="0.1deg").to_dict()
         == hrsynth.accuracy("quattro", "1,4", noise="0.1deg").to_dict()
     )
-    setting = robot("direction", tmp_path)
+    setup = robot("direction", tmp_path)
     one, other = (
-        hrsynth.accuracy(setting, **given).poses[0]
+        hrsynth.accuracy(setup, **given).poses[0]
         for given in ({"noise": "1mm,0.1deg"}, {"noise": "1mm", "cone": "0.1deg"})
     )
     assert one.position.to_dict() == other.position.to_dict()
@@ -197,14 +197,14 @@ def test_cones_of_directions_are_their_noise(tmp_path: Path) -> None:
 
 
 def test_a_grid_is_its_single_poses_and_leaves_out_what_is_behind_the_camera(tmp_path: Path) -> None:
-    setting = robot("point", tmp_path)
-    found = hrsynth.accuracy(setting, noise="0.3px", grid="z=-1:1.4:7")
+    setup = robot("point", tmp_path)
+    found = hrsynth.accuracy(setup, noise="0.3px", grid="z=-1:1.4:7")
     assert found.field is not None
     assert found.field.reached.tolist() == [False] * 2 + [True] * 5
-    single = hrsynth.accuracy(setting, noise="0.3px", at="z=1.4").poses[0]
+    single = hrsynth.accuracy(setup, noise="0.3px", at="z=1.4").poses[0]
     assert single.position.largest == pytest.approx(found.field.position[-1], rel=1e-6)
     with pytest.raises(BadRequest, match="not in front of its camera"):
-        hrsynth.accuracy(setting, noise="0.3px", at="z=-1")
+        hrsynth.accuracy(setup, noise="0.3px", at="z=-1")
 
 
 @pytest.mark.parametrize(
@@ -227,14 +227,14 @@ def test_what_is_no_amount_is_refused_in_a_line(name: str, given: dict[str, str]
 @pytest.mark.parametrize("kind", sorted(set(kinds()) - {"encoder"}))
 def test_what_a_sensor_makes_of_noise_to_first_order(kind: str, tmp_path: Path) -> None:
     """The images of the unit balls are what the simulated sensor gives, but for the square of the noise."""
-    setting = next(
+    setup = next(
         robot(name, tmp_path) for name, see in MORE.items() if any(each.startswith(f"{kind}:") for each in see)
     )
-    at, rng = setting.everything.start, np.random.default_rng(1)
+    at, rng = setup.all_samples.start, np.random.default_rng(1)
     amounts = {"px": 0.3, "m": 1e-3, "rad": 1e-3}
-    seen = next(o for o in setting.observed if o.kind == kind)
+    seen = next(o for o in setup.observed if o.kind == kind)
     own = {unit: amounts[unit] for unit in seen.found_by}
-    (value,) = values(at, (seen,), setting.mechanism.reference)
+    (value,) = values(at, (seen,), setup.mechanism.reference)
     for _ in range(20):
         given = rng.normal(size=(2, 3))
         given /= np.linalg.norm(given, axis=1, keepdims=True)

@@ -12,7 +12,7 @@ import pytest
 
 from hrsynth import accuracy, load
 from hrsynth.analysis.accuracy import swept
-from hrsynth.errors import BadRequest, BuildStopped, PlaneNotMet
+from hrsynth.errors import BadRequest, BuildStopped, NoReachablePose
 from hrsynth.mechanism.pose import Grid
 
 ASKED: dict[str, Any] = {"cone": "0.1deg", "grid": "x=-0.9:0.9:9,y=-0.9:0.9:7,z=-0.8:-0.6:3"}
@@ -157,7 +157,7 @@ def test_refusals(tmp_path: Path, into: str, asked: dict[str, Any], word: str) -
 def test_poses_one_by_one_and_out_of_reach_leave_nothing(tmp_path: Path) -> None:
     with pytest.raises(BadRequest, match="one by one"):
         accuracy("3rps", cone="0.1deg", grid="z=0.4:0.5:4", into=tmp_path / "s.npy")
-    with pytest.raises(PlaneNotMet):
+    with pytest.raises(NoReachablePose):
         accuracy("quattro_rigid", "1,2,3", cone="0.1deg", grid="x=5:6:3,z=-0.7", into=tmp_path / "s.npy")
     assert not list(tmp_path.iterdir())
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrsynth.analysis.modes.curves import Circle
+from hrsynth.analysis.modes.loci import Circle
 from hrsynth.analysis.modes.rigid import Planar
 from hrsynth.analysis.modes.solve import solve
 from hrsynth.geometry.vectors import Array, inverse, perpendicular, pose, unit
@@ -35,11 +35,11 @@ class SixModes:
     poses: Array
     ends: Array
 
-    def configurations(self, twin: PinocchioModel) -> list[ClosedConfiguration]:
+    def configurations(self, model: PinocchioModel) -> list[ClosedConfiguration]:
         """The robot at its poses, its joint angles by the turns of its links."""
-        return [self._at(twin, X, ends) for X, ends in zip(self.poses, self.ends, strict=True)]
+        return [self._at(model, X, ends) for X, ends in zip(self.poses, self.ends, strict=True)]
 
-    def _at(self, twin: PinocchioModel, X: Array, ends: Array) -> ClosedConfiguration:
+    def _at(self, model: PinocchioModel, X: Array, ends: Array) -> ClosedConfiguration:
         robot, n = self.robot, normal(self.robot)
         feet = [robot.joints[f"joint_{i}_1"].point for i in LEGS]
         knees = [robot.joints[f"joint_{i}_2"].point for i in LEGS]
@@ -48,10 +48,10 @@ class SixModes:
         turns = {robot.base: 0.0, robot.platform: angle(n, x, turn @ x)}
         for i, foot, knee, end in zip(LEGS, feet, knees, ends, strict=True):
             turns |= {f"lower_{i}": angle(n, knee - foot, end - foot), f"upper_{i}": 0.0}
-        step = np.zeros(twin.nv)
+        step = np.zeros(model.nv)
         for joint in robot.joints.values():
-            step[list(twin.coordinates[joint.name])] = turns[joint.successor] - turns[joint.predecessor]
-        return ClosedConfiguration.of(twin, twin.integrate(twin.q0, step))
+            step[list(model.coordinates[joint.name])] = turns[joint.successor] - turns[joint.predecessor]
+        return ClosedConfiguration.of(model, model.integrate(model.q0, step))
 
 
 def normal(robot: Mechanism) -> Array:

@@ -16,11 +16,11 @@ from hypothesis import strategies as st
 from analysis.aspects.certified import check_certified
 from hrsynth.analysis.aspects.condition_enclosure import ConditionEnclosure, enclose_value, prove
 from hrsynth.analysis.aspects.leg_forms import LegPattern
-from hrsynth.analysis.aspects.path import BUDGET, Aspects, path
+from hrsynth.analysis.aspects.path import BUDGET, PathPlanner, path
 from hrsynth.analysis.aspects.path_segments import StraightSegment, mode_change
-from hrsynth.analysis.aspects.road_map import PoseRegion, plan
-from hrsynth.analysis.aspects.words import SAME, SEPARATED, UNDECIDED
-from hrsynth.analysis.singularity.agreement import smallest_of
+from hrsynth.analysis.aspects.roadmap import PoseRegion, plan
+from hrsynth.analysis.aspects.verdicts import SAME, SEPARATED, UNDECIDED
+from hrsynth.analysis.singularity.condition_check import smallest_of
 from hrsynth.closed_forms.legs import OnCrank
 from hrsynth.constraints.vector_algebra import evaluate
 from hrsynth.description import load
@@ -54,15 +54,15 @@ KNOWN = SIGNED + UNSIGNED
 
 
 @cache
-def aspects_of(robot: str, observe: str | None = None) -> Aspects:
-    return Aspects.of(load(robot), observe)
+def aspects_of(robot: str, observe: str | None = None) -> PathPlanner:
+    return PathPlanner.of(load(robot), observe)
 
 
 @cache
 def walk(robot: str, observe: str | None, count: int = 24, seed: int = 0) -> tuple[ClosedConfiguration, ...]:
     """Random configurations in the working mode of most of them."""
     aspects = aspects_of(robot, observe)
-    found = tuple(random_walk(aspects.setting.samples.start, count, seed))
+    found = tuple(random_walk(aspects.setup.samples.start, count, seed))
     modes = [aspects.enclosure(at).forms.modes for at in found]
     return tuple(at for at, own in zip(found, modes, strict=True) if own == max(modes, key=modes.count))
 
@@ -73,7 +73,7 @@ def pairs(robot: str, observe: str | None, count: int, seed: int = 0) -> list[tu
     return [tuple(places[i] for i in rng.choice(len(places), 2, replace=False)) for _ in range(count)]
 
 
-def signs(aspects: Aspects, *configurations: ClosedConfiguration) -> np.ndarray:
+def signs(aspects: PathPlanner, *configurations: ClosedConfiguration) -> np.ndarray:
     return np.sign(aspects.condition.evaluate(aspects.structure.values_at(configurations)))
 
 
@@ -174,8 +174,8 @@ def test_separated_poses_are_so_in_all_working_modes(robot: str, observe: str | 
                         aspects.condition.expression,
                         replace(
                             forms,
-                            limbs=tuple(
-                                replace(limb, mode=mode) for limb, mode in zip(forms.limbs, modes, strict=True)
+                            subchains=tuple(
+                                replace(limb, mode=mode) for limb, mode in zip(forms.subchains, modes, strict=True)
                             ),
                         )
                         .at(p, R)
@@ -183,7 +183,7 @@ def test_separated_poses_are_so_in_all_working_modes(robot: str, observe: str | 
                     )[0]
                 )
             )
-            for modes in product((1.0, -1.0), repeat=len(forms.limbs))
+            for modes in product((1.0, -1.0), repeat=len(forms.subchains))
         }
         met += 1
         answer = aspects.join(*pair, any_mode=True, budget=20)
@@ -230,7 +230,7 @@ def test_nine_of_ten_pairs_on_one_side_are_joined():
 def test_poses_anywhere_on_one_side_are_joined(robot: str, observe: str | None):
     aspects, rng = aspects_of(robot, observe), np.random.default_rng(1)
     assert isinstance(aspects.pattern, LegPattern)
-    carriage, reading = aspects.pattern.coordinates, aspects.enclosure(aspects.setting.samples.start)
+    carriage, reading = aspects.pattern.coordinates, aspects.enclosure(aspects.setup.samples.start)
     p, R = carriage.of(aspects.members)
     near = PoseRegion.around(carriage, p, R)
     P, Q = replace(near, shift=2.5 * near.shift, turn=np.minimum(3 * near.turn, np.pi)).draw(rng, 2000)
@@ -266,7 +266,7 @@ def test_a_way_that_crosses_the_locus_twice_is_led_around_it():
     around = 0
     for pair in pairs("gough_stewart", "1,2,3", 16, seed=6):
         answer = aspects.join(*pair)
-        if answer.verdict == SAME and len(answer.ways) > 1:
+        if answer.verdict == SAME and len(answer.segments) > 1:
             p, R = answer.coordinates.of(pair)
             straight = StraightSegment.between((p[0], R[0]), (p[1], R[1]))
             reached, values = aspects.enclosure(pair[0]).at(*straight.at(np.linspace(0, 1, 2001)))
@@ -283,7 +283,7 @@ def test_a_way_that_crosses_the_locus_twice_is_led_around_it():
 def test_a_way_that_leaves_the_workspace_is_never_proved(robot: str, observe: str | None):
     aspects, rng = aspects_of(robot, observe), np.random.default_rng(0)
     assert isinstance(aspects.pattern, LegPattern)
-    reading = aspects.enclosure(aspects.setting.samples.start)
+    reading = aspects.enclosure(aspects.setup.samples.start)
     p, R = aspects.pattern.coordinates.of(aspects.members)
     region = PoseRegion.around(aspects.pattern.coordinates, p, R)
     places = replace(region, shift=6 * region.shift).draw(rng, 4000)
@@ -304,7 +304,7 @@ def test_a_way_that_leaves_the_workspace_is_never_proved(robot: str, observe: st
 @pytest.mark.parametrize("robot", ["3puu", "3ruu"])
 def test_a_path_crosses_the_limit_of_a_leg_into_its_other_working_mode(robot: str):
     aspects = aspects_of(robot)
-    places = list(random_walk(aspects.setting.samples.start, 150, 0))
+    places = list(random_walk(aspects.setup.samples.start, 150, 0))
     modes = [aspects.enclosure(at).forms.modes for at in places]
     others = [at for at, mode in zip(places, modes, strict=True) if mode != modes[0]]
     assert others
@@ -313,10 +313,10 @@ def test_a_path_crosses_the_limit_of_a_leg_into_its_other_working_mode(robot: st
         assert answer.verdict == SAME
         apart = sum(a != b for a, b in zip(modes[0], aspects.enclosure(at).forms.modes, strict=True))
         assert len(answer.crossings) == apart
-        assert isinstance(answer.ways[0], StraightSegment)
-        assert isinstance(answer.ways[-1], StraightSegment)
-        assert prove(aspects.enclosure(places[0]), answer.ways[0], 10_000).margin >= answer.margin
-        assert prove(aspects.enclosure(at), answer.ways[-1], 10_000).margin >= answer.margin
+        assert isinstance(answer.segments[0], StraightSegment)
+        assert isinstance(answer.segments[-1], StraightSegment)
+        assert prove(aspects.enclosure(places[0]), answer.segments[0], 10_000).margin >= answer.margin
+        assert prove(aspects.enclosure(at), answer.segments[-1], 10_000).margin >= answer.margin
         check_certified(aspects, answer, 200)
 
 
@@ -326,7 +326,7 @@ def test_a_crossing_leads_from_one_working_mode_to_the_other():
     carriage, fractions = aspects.pattern.coordinates, np.linspace(0, 1, 11)
     for at in walk("3rrr_m1", None)[:5]:
         chart, (p, R) = aspects.enclosure(at).forms, carriage.of([at])
-        for number, limb in enumerate(chart.limbs):
+        for number, limb in enumerate(chart.subchains):
             assert isinstance(limb, OnCrank)
             found = mode_change(carriage, limb, number, (p[0], R[0]))
             assert found is not None
@@ -349,9 +349,9 @@ def test_a_crossing_leads_from_one_working_mode_to_the_other():
 @settings(max_examples=5, deadline=None)
 @given(words=st.lists(st.sampled_from(["RRR", "RPR", "PRR"]), min_size=3, max_size=3), seed=st.integers(0, 10**6))
 def test_random_planar_robots(words: list[str], seed: int):
-    aspects = Aspects.of(planar(words, np.random.default_rng(seed), [{0}] * 3))
+    aspects = PathPlanner.of(planar(words, np.random.default_rng(seed), [{0}] * 3))
     assert isinstance(aspects.pattern, LegPattern)
-    places = list(random_walk(aspects.setting.samples.start, 4, seed))
+    places = list(random_walk(aspects.setup.samples.start, 4, seed))
     for start, goal in pairwise(places):
         answer, sides = aspects.join(start, goal), signs(aspects, start, goal)
         same = aspects.enclosure(start).forms.modes == aspects.enclosure(goal).forms.modes
@@ -400,14 +400,14 @@ def test_the_mean_value_form_holds_all_values_and_is_sharper_on_short_intervals(
 @pytest.mark.slow
 def test_reasons_why_nothing_is_decided():
     lost = aspects_of("prrrp_parallel")
-    places = list(random_walk(lost.setting.samples.start, 2))
+    places = list(random_walk(lost.setup.samples.start, 2))
     answer = lost.join(*places)
     assert (answer.verdict, answer.certified) == (UNDECIDED, False)
     assert "1 of 2 freedoms is never seen: translation along y (at the zero configuration)" in answer.reason
 
     parasitic = aspects_of("3rps")
     verdicts = set()
-    places = list(random_walk(parasitic.setting.samples.start, 30))
+    places = list(random_walk(parasitic.setup.samples.start, 30))
     for start, goal in pairwise(places):
         answer = parasitic.join(start, goal)
         assert not answer.certified
@@ -440,12 +440,12 @@ def test_a_budget_that_is_used_up_is_said():
     answers = [aspects.join(*pair, budget=6) for pair in pairs("gough_stewart", "1,2,3", 16, seed=6)]
     left = [answer for answer in answers if answer.verdict == UNDECIDED]
     assert left
-    assert all("used up" in answer.reason and not answer.certified and answer.ways for answer in left)
+    assert all("used up" in answer.reason and not answer.certified and answer.segments for answer in left)
 
 
 def test_the_same_request_has_the_same_answer():
     aspects = aspects_of("gough_stewart", "1,2,3")
-    pair = next(pair for pair in pairs("gough_stewart", "1,2,3", 16, seed=6) if len(aspects.join(*pair).ways) > 1)
+    pair = next(pair for pair in pairs("gough_stewart", "1,2,3", 16, seed=6) if len(aspects.join(*pair).segments) > 1)
     assert aspects.join(*pair).to_dict() == aspects.join(*pair).to_dict()
 
 

@@ -14,9 +14,9 @@ import pytest
 import hrsynth
 from analysis.aspects.certified import check_certified
 from analysis.aspects.six_modes import determinants, six_modes, tips_at
-from hrsynth.analysis.aspects import atlas as module
-from hrsynth.analysis.aspects.atlas import Atlas, atlas
-from hrsynth.analysis.aspects.words import SAME, SEPARATED, UNDECIDED
+from hrsynth.analysis.aspects import aspects as module
+from hrsynth.analysis.aspects.aspects import AspectTable, aspects
+from hrsynth.analysis.aspects.verdicts import SAME, SEPARATED, UNDECIDED
 from hrsynth.cli import execute
 from hrsynth.errors import BadRequest, PoseNotReached
 from hrsynth.families.planar import six_poses
@@ -27,11 +27,11 @@ ROBOTS = [("quattro", "1,4"), ("gough_stewart", "1,3,5"), ("rrrrr_m1", None), ("
 
 
 @cache
-def atlas_of(name: str, observe: str | None = None) -> Atlas:
-    return atlas(six_poses() if name == "six" else hrsynth.load(name), observe)
+def atlas_of(name: str, observe: str | None = None) -> AspectTable:
+    return aspects(six_poses() if name == "six" else hrsynth.load(name), observe)
 
 
-def check_table(found: Atlas) -> None:
+def check_table(found: AspectTable) -> None:
     """Each mode is in one aspect with itself; the table is symmetric; "same aspect" is an equivalence that "separated"
     respects, so no two modes are both; the number of aspects is what the table allows."""
     table, size = found.table, len(found.places)
@@ -88,9 +88,16 @@ def test_a_cuspidal_robot_goes_from_mode_to_mode_with_the_same_directions():
     assert any(not answer.crossings for answer in paths)
     for answer in paths:
         check_certified(found.aspects, answer, 200)
-        question = found.aspects.setting.samples.question
+        observation_model = found.aspects.setup.samples.observation_model
         seen = [
-            np.array(measure(end.configuration.twin, end.configuration.q, question.reference, question.observations)[2])
+            np.array(
+                measure(
+                    end.configuration.model,
+                    end.configuration.q,
+                    observation_model.reference,
+                    observation_model.observations,
+                )[2]
+            )
             for end in (answer.start, answer.goal)
         ]
         assert np.max(np.abs(seen[0] - seen[1])) < 1e-9
@@ -103,10 +110,10 @@ def test_limits_that_no_path_considers_are_named():
     """A limit on one side is not enclosed along a path: what leads from mode to mode may pass it."""
     robot = hrsynth.load("quattro")
     elbow = next(joint for joint in robot.joints.values() if joint.type.value == "R" and not joint.actuated)
-    found = hrsynth.atlas(robot.changed(joints=[replace(elbow, limits=Limits(lower=-1.0))]), "1,4")
+    found = hrsynth.aspects(robot.changed(joints=[replace(elbow, limits=Limits(lower=-1.0))]), "1,4")
     paths = [pair.answer for pair in found.pairs if pair.verdict == SAME and pair.answer is not None]
     assert paths
-    assert all(each.unlimited == (elbow.name,) for each in paths)
+    assert all(each.limits_ignored == (elbow.name,) for each in paths)
     assert str(found).rstrip().endswith(f"limits of joints {elbow.name}")
     assert "limits of joints" not in str(atlas_of("quattro", "1,4"))
 
@@ -123,7 +130,7 @@ def test_pairs_that_follow_from_others_agree_with_their_own_paths():
     """For random robots in tilted planes with six modes: what follows from other pairs, asked for directly, is never
     the opposite; nor is the sign of the determinant by lines along cranks, without the engine."""
     for instance, _ in zip(six_modes(5), range(2), strict=False):
-        found = atlas(instance.robot)
+        found = aspects(instance.robot)
         check_table(found)
         assert found.cuspidal
         p = np.array([at.pose(instance.robot.platform) for at in found.places])
@@ -148,7 +155,7 @@ def test_a_mode_that_is_not_proved_shows_nothing():
 
 def test_intervals_that_are_used_up_leave_pairs_undecided(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(module, "ATLAS_INTERVALS", 1)
-    found = atlas(six_poses())
+    found = aspects(six_poses())
     check_table(found)
     assert found.cuspidal is None
     assert found.count[1] > 2
@@ -157,23 +164,23 @@ def test_intervals_that_are_used_up_leave_pairs_undecided(monkeypatch: pytest.Mo
 
 @pytest.mark.slow
 def test_a_continuum_has_an_empty_table_and_no_picture(capsys: pytest.CaptureFixture[str], tmp_path: Path):
-    found = atlas(hrsynth.load("quattro"), "1")
+    found = aspects(hrsynth.load("quattro"), "1")
     assert found.table == []
     assert found.cuspidal is None
     assert "continuum" in str(found)
     with pytest.raises(BadRequest, match="continuum"):
         hrsynth.draw(found)
     picture = tmp_path / "atlas.png"
-    assert execute(["atlas", "quattro", "--observe", "1", "-o", str(picture)]) == 0
+    assert execute(["aspects", "quattro", "--observe", "1", "-o", str(picture)]) == 0
     assert "is not drawn" in capsys.readouterr().err
     assert not picture.exists()
 
 
 def test_json_is_the_contract(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     picture = tmp_path / "atlas.png"
-    assert execute(["atlas", "quattro", "--observe", "1,4", "--json", "-o", str(picture)]) == 0
+    assert execute(["aspects", "quattro", "--observe", "1,4", "--json", "-o", str(picture)]) == 0
     data = json.loads(capsys.readouterr().out)
-    assert (data["robot"], data["command"], data["cuspidal"]) == ("quattro", "atlas", True)
+    assert (data["robot"], data["command"], data["cuspidal"]) == ("quattro", "aspects", True)
     assert data["table"][1] == [SEPARATED, SAME, SAME, UNDECIDED]
     assert data["aspects"] == {"least": 2, "most": 2, "modes": [[1], [2, 3]]}
     assert len(data["modes"]) == 4

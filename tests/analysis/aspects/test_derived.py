@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from hrsynth.analysis.aspects.leg_forms import LegPattern
-from hrsynth.analysis.aspects.path import Aspects, leads
-from hrsynth.analysis.aspects.words import SAME, SEPARATED
+from hrsynth.analysis.aspects.path import PathPlanner, leads
+from hrsynth.analysis.aspects.verdicts import SAME, SEPARATED
 from hrsynth.closed_forms.legs import ClosedFormLeg
 from hrsynth.description import load
 from hrsynth.geometry.balls import balls
@@ -39,18 +39,18 @@ RANDOM = ("RRR", "RPR", "PRR", "five-bar", "UPS", "R2-SS")
 
 
 @cache
-def aspects_of(name: str) -> Aspects:
+def aspects_of(name: str) -> PathPlanner:
     rng = np.random.default_rng(len(name))
     if name in ("RRR", "RPR", "PRR"):
-        return Aspects.of(planar([name] * 3, rng, [{0}] * 3))
+        return PathPlanner.of(planar([name] * 3, rng, [{0}] * 3))
     if name == "five-bar":
-        return Aspects.of(planar(["RRR"] * 2, rng, [{0}] * 2, point=True))
+        return PathPlanner.of(planar(["RRR"] * 2, rng, [{0}] * 2, point=True))
     if name == "UPS":
-        return Aspects.of(pods(["UPS"] * 6, rng, True), ["1", "2", "3"])
-    return Aspects.of(deltas(["R"] * 3, ["2-SS"] * 3, rng, True) if name == "R2-SS" else load(name))
+        return PathPlanner.of(pods(["UPS"] * 6, rng, True), ["1", "2", "3"])
+    return PathPlanner.of(deltas(["R"] * 3, ["2-SS"] * 3, rng, True) if name == "R2-SS" else load(name))
 
 
-def known(aspects: Aspects) -> LegPattern:
+def known(aspects: PathPlanner) -> LegPattern:
     assert isinstance(aspects.pattern, LegPattern)
     return aspects.pattern
 
@@ -63,11 +63,11 @@ def test_forms_are_read_from_the_joints_and_hold_at_other_poses(name: str):
     aspects = aspects_of(name)
     pattern = known(aspects)
     assert pattern.fitted == ()
-    for at in random_walk(aspects.setting.samples.start, 5, 77):
+    for at in random_walk(aspects.setup.samples.start, 5, 77):
         p, R = pattern.coordinates.of([at])
         chart = pattern.forms(at)
-        for limb, feature in zip(chart.limbs, pattern.carried, strict=True):
-            poses = {link: _scaled(at.pose(link), at.twin.length) for link in feature.links}
+        for limb, feature in zip(chart.subchains, pattern.carried, strict=True):
+            poses = {link: _scaled(at.pose(link), at.model.length) for link in feature.links}
             assert limb.solve(limb.tip.value(p, R), limb.mode)[1] == pytest.approx(feature.value(poses), abs=1e-7)
 
 
@@ -81,12 +81,12 @@ def _scaled(X: np.ndarray, length: float) -> np.ndarray:
 @pytest.mark.parametrize("name", ["RRR", "gough_stewart", "quattro"])
 def test_what_is_fitted_is_not_certified(name: str):
     free = aspects_of(name)
-    aspects = Aspects(free.setting, free.motion, free.structure, free.condition, free.lost)
+    aspects = PathPlanner(free.setup, free.motion, free.structure, free.condition, free.lost)
     pattern = known(free)
-    fitted = replace(pattern, limbs=tuple(replace(limb, fitted=limb.label == "2") for limb in pattern.limbs))
+    fitted = replace(pattern, subchains=tuple(replace(limb, fitted=limb.label == "2") for limb in pattern.subchains))
     aspects.__dict__["pattern"] = fitted
     met = set()
-    for start, goal in pairwise(list(random_walk(free.setting.samples.start, 12, 3))):
+    for start, goal in pairwise(list(random_walk(free.setup.samples.start, 12, 3))):
         told, less = free.join(start, goal), aspects.join(start, goal)
         assert told.verdict == less.verdict
         assert not less.certified
@@ -100,7 +100,7 @@ def test_what_is_fitted_is_not_certified(name: str):
 def test_ways_with_a_gap_lead_nowhere():
     """A path must begin and end at the poses asked for, in their working modes, without a gap between its parts."""
     aspects, joined = aspects_of("RRR"), 0
-    for start, goal in pairwise(list(random_walk(aspects.setting.samples.start, 8, 5))):
+    for start, goal in pairwise(list(random_walk(aspects.setup.samples.start, 8, 5))):
         answer = aspects.join(start, goal)
         if answer.verdict != SAME:
             continue
@@ -108,11 +108,11 @@ def test_ways_with_a_gap_lead_nowhere():
         readings = [aspects.enclosure(start), aspects.enclosure(goal)]
         p, R = known(aspects).coordinates.of([start, goal])
         ends = (p[0], R[0]), (p[1], R[1])
-        assert leads(answer.ways, *ends, readings)
-        assert not leads(answer.ways, ends[0], (p[1] + 1e-9, R[1]), readings)
-        assert not leads(answer.ways[1:], *ends, readings)
+        assert leads(answer.segments, *ends, readings)
+        assert not leads(answer.segments, ends[0], (p[1] + 1e-9, R[1]), readings)
+        assert not leads(answer.segments[1:], *ends, readings)
         other = replace(readings[1], forms=readings[1].forms.flipped(0))
-        assert not leads(answer.ways, *ends, [readings[0], other])
+        assert not leads(answer.segments, *ends, [readings[0], other])
     assert joined
 
 
@@ -121,9 +121,9 @@ def test_ways_with_a_gap_lead_nowhere():
 def test_balls_hold_limbs_whose_numbers_were_rounded(name: str):
     """The reserve and what is carried, of limbs with numbers moved by less than 1e-10, lie in the balls."""
     aspects, rng = aspects_of(name), np.random.default_rng(0)
-    start = aspects.setting.samples.start
+    start = aspects.setup.samples.start
     p, R = known(aspects).coordinates.of([start])
-    for limb in aspects.enclosure(start).forms.limbs:
+    for limb in aspects.enclosure(start).forms.subchains:
         tip = limb.tip.value(np.array([balls(row, row) for row in p]), R.astype(object))
         reserve, carried = limb.solve(tip, limb.mode)
         for _ in range(20):

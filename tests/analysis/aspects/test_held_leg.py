@@ -10,8 +10,8 @@ import pytest
 
 import hrsynth
 from analysis.aspects.six_modes import six_modes
-from hrsynth.analysis.aspects.atlas import Atlas, atlas
-from hrsynth.analysis.aspects.held_leg import HeldLegSection, SectionPoint, section
+from hrsynth.analysis.aspects.aspects import AspectTable, aspects
+from hrsynth.analysis.aspects.singularity_slice import SectionPoint, SingularitySlice, section
 from hrsynth.analysis.aspects.three_cranks import ThreeCranks, mode_counts, three_cranks
 from hrsynth.description import native
 from hrsynth.families.planar import six_poses
@@ -21,26 +21,26 @@ STEP = 2e-3
 
 
 @cache
-def classic() -> Atlas:
-    return atlas(six_poses())
+def classic() -> AspectTable:
+    return aspects(six_poses())
 
 
 @cache
-def drawn_of(seed: int | None) -> HeldLegSection:
+def drawn_of(seed: int | None) -> SingularitySlice:
     """The classic robot, or a random robot in a random plane with its second leg held."""
     if seed is None:
         made = classic().section
         assert not isinstance(made, str)
         return made[0]
     (instance,) = islice(six_modes(seed), 1)
-    found = atlas(instance.robot, ["2", "3", "1"])
+    found = aspects(instance.robot, ["2", "3", "1"])
     made = found.section
     assert not isinstance(made, str)
     assert made[0].robot.labels == ("2", "3", "1")
     return made[0]
 
 
-def misses(drawn: HeldLegSection, place: SectionPoint) -> np.ndarray:
+def misses(drawn: SingularitySlice, place: SectionPoint) -> np.ndarray:
     """How far (squared) a corner is from its circle while the other two go along theirs by −3 to 3 steps from a place:
     with the directions held, the modes are its zeros. Of the three corners the one that leaves the others farthest from
     the end of their way."""
@@ -77,12 +77,12 @@ def derivatives(values: np.ndarray) -> tuple[float, float, float, float]:
 
 
 @pytest.fixture(params=[None, pytest.param(3, marks=pytest.mark.slow)])
-def drawn(request: pytest.FixtureRequest) -> HeldLegSection:
+def drawn(request: pytest.FixtureRequest) -> SingularitySlice:
     return drawn_of(request.param)
 
 
 @pytest.mark.slow
-def test_three_modes_meet_at_a_cusp(drawn: HeldLegSection):
+def test_three_modes_meet_at_a_cusp(drawn: SingularitySlice):
     """The distance to the third circle has a triple zero there."""
     assert len(drawn.cusps) >= 2
     enclosed = [cusp for cusp in drawn.cusps if cusp.radius is not None]
@@ -95,7 +95,7 @@ def test_three_modes_meet_at_a_cusp(drawn: HeldLegSection):
 
 
 @pytest.mark.slow
-def test_two_modes_meet_twice_at_a_node(drawn: HeldLegSection):
+def test_two_modes_meet_twice_at_a_node(drawn: SingularitySlice):
     for one, other in drawn.nodes:
         assert np.max(np.abs(np.exp(1j * np.array(one.directions)) - np.exp(1j * np.array(other.directions)))) < 1e-9
         angles = np.array([[each.crank, each.turn] for each in (one, other)])
@@ -107,7 +107,7 @@ def test_two_modes_meet_twice_at_a_node(drawn: HeldLegSection):
 
 
 @pytest.mark.slow
-def test_the_curve_is_where_two_modes_meet(drawn: HeldLegSection):
+def test_the_curve_is_where_two_modes_meet(drawn: SingularitySlice):
     """All along the curve the distance to the third circle has a double zero, and pieces are closed."""
     for piece in drawn.curve:
         assert np.max(np.abs(np.exp(1j * piece[0]) - np.exp(1j * piece[-1]))) < 1e-6
@@ -117,7 +117,7 @@ def test_the_curve_is_where_two_modes_meet(drawn: HeldLegSection):
 
 
 @pytest.mark.slow
-def test_the_number_of_modes_changes_at_the_curve_alone(drawn: HeldLegSection):
+def test_the_number_of_modes_changes_at_the_curve_alone(drawn: SingularitySlice):
     """Neighbouring directions with different numbers of modes are apart from the curve's image by a cell at most."""
     ticks = np.linspace(-np.pi, np.pi, 73)
     counts = mode_counts(drawn.robot, drawn.held, ticks, ticks, 2000)
@@ -162,13 +162,13 @@ def test_modes_are_counted_where_the_second_corner_just_reaches_its_circle():
 @pytest.mark.parametrize("axis", ["0 0 1", "0 0 -1"])
 def test_the_turn_of_a_mode_is_counted_as_phi_of_its_pose(axis: str):
     """Whatever the sense of the file's axes."""
-    text = hrsynth.shipped()["3rrr_m1"].read_text(encoding="utf-8")
+    text = hrsynth.list_robots()["3rrr_m1"].read_text(encoding="utf-8")
     assert '<axis xyz="0 0 1"/>' in text
-    found = atlas(native.parse(text.replace('<axis xyz="0 0 1"/>', f'<axis xyz="{axis}"/>')))
+    found = aspects(native.parse(text.replace('<axis xyz="0 0 1"/>', f'<axis xyz="{axis}"/>')))
     places = [at for at in found.places if at is not None]
     made = three_cranks(found.aspects, places)
     assert not isinstance(made, str)
-    turns = [at.pose(found.aspects.setting.mechanism.platform)[:3, 0] for at in places]
+    turns = [at.pose(found.aspects.setup.mechanism.platform)[:3, 0] for at in places]
     phi = [np.arctan2(turn[1], turn[0]) for turn in turns]
     assert len(phi) == 2
     assert abs(phi[1] - phi[0]) > 0.1
@@ -188,7 +188,7 @@ def test_the_turn_of_a_mode_is_counted_as_phi_of_its_pose(axis: str):
     ],
 )
 def test_other_robots_have_no_such_section(name: str, observe: str | None, reason: str):
-    found = atlas(hrsynth.load(name), observe)
+    found = aspects(hrsynth.load(name), observe)
     made = found.section
     assert isinstance(made, str)
     assert reason in made

@@ -12,8 +12,8 @@ import pytest
 from analysis.aspects.certified import check_certified, followed
 from hrsynth.analysis.aspects.joint_limits import SlideLimit, TurnLimit
 from hrsynth.analysis.aspects.leg_forms import LegPattern
-from hrsynth.analysis.aspects.path import Aspects
-from hrsynth.analysis.aspects.words import SAME, SEPARATED, UNDECIDED
+from hrsynth.analysis.aspects.path import PathPlanner
+from hrsynth.analysis.aspects.verdicts import SAME, SEPARATED, UNDECIDED
 from hrsynth.description import load
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.walking import random_walk
@@ -45,17 +45,17 @@ def single(robot: Mechanism) -> list[str]:
 
 def coordinates(at: ClosedConfiguration, joint: str) -> float:
     """A joint's coordinate: radians, or metres."""
-    (place,) = at.twin.coordinates[joint]
-    found = float(at.twin.difference(at.twin.q0, at.q)[place])
-    return found * at.twin.length if at.twin.mechanism.joints[joint].type is JointType.PRISMATIC else found
+    (place,) = at.model.coordinates[joint]
+    found = float(at.model.difference(at.model.q0, at.q)[place])
+    return found * at.model.length if at.model.mechanism.joints[joint].type is JointType.PRISMATIC else found
 
 
 @cache
-def limited(robot: str, observe: str | None) -> Aspects:
+def limited(robot: str, observe: str | None) -> PathPlanner:
     """A robot with limits on all its R and P joints, not in the middle of their zero."""
     mechanism = load(robot)
     rng = np.random.default_rng(0)
-    return Aspects.of(
+    return PathPlanner.of(
         with_limits(mechanism, {name: Limits(*(rng.uniform(0.05, 0.5, 2) * [-1, 1])) for name in single(mechanism)}),
         observe,
     )
@@ -66,13 +66,13 @@ def limited(robot: str, observe: str | None) -> Aspects:
 def test_a_reserve_tells_how_far_a_coordinate_is_from_its_limits(robot: str, observe: str | None):
     aspects = limited(robot, observe)
     assert isinstance(aspects.pattern, LegPattern)
-    assert {bound.joint for bound in aspects.pattern.bounds} == set(single(aspects.setting.mechanism))
+    assert {bound.joint for bound in aspects.pattern.bounds} == set(single(aspects.setup.mechanism))
     beyond = 0
-    for at in random_walk(aspects.setting.samples.start, 12, 1):
+    for at in random_walk(aspects.setup.samples.start, 12, 1):
         chart = aspects.enclosure(at).forms
-        reserves = chart.at(*aspects.pattern.coordinates.of([at])).reach_margins[0, len(chart.limbs) :]
+        reserves = chart.at(*aspects.pattern.coordinates.of([at])).reach_margins[0, len(chart.subchains) :]
         for bound, reserve in zip(chart.bounds, reserves, strict=True):
-            joint = at.twin.mechanism.joints[bound.joint]
+            joint = at.model.mechanism.joints[bound.joint]
             assert joint.limits is not None
             middle, half = np.array([[0.5, 0.5], [-0.5, 0.5]]) @ [joint.limits.lower, joint.limits.upper]
             away = coordinates(at, bound.joint) - middle
@@ -81,7 +81,7 @@ def test_a_reserve_tells_how_far_a_coordinate_is_from_its_limits(robot: str, obs
                 assert reserve == pytest.approx(bound.size * (np.cos(away) - np.cos(half)), abs=1e-6)
             else:
                 assert isinstance(bound, SlideLimit)
-                assert reserve == pytest.approx((half**2 - away**2) / at.twin.length**2, abs=1e-6)
+                assert reserve == pytest.approx((half**2 - away**2) / at.model.length**2, abs=1e-6)
     assert beyond
 
 
@@ -105,8 +105,8 @@ def furthest(path: list[ClosedConfiguration], joints: list[str]) -> tuple[str, f
 )
 def test_paths_are_led_around_the_limits_that_others_pass(robot: Mechanism):
     """Limits that a path without them leaves: another path keeps to them, or none is found."""
-    free = Aspects.of(robot)
-    places = list(random_walk(free.setting.samples.start, 40, 1))
+    free = PathPlanner.of(robot)
+    places = list(random_walk(free.setup.samples.start, 40, 1))
     led = []
     for one, other in zip(places[:20:2], places[::-3], strict=False):
         plain = free.join(one, other)
@@ -115,7 +115,7 @@ def test_paths_are_led_around_the_limits_that_others_pass(robot: Mechanism):
         joint, low, high = furthest([one, *followed(free, plain, 40), other], single(robot))
         if high - low > 6:
             continue
-        aspects = Aspects.of(with_limits(robot, {joint: Limits(low, high)}))
+        aspects = PathPlanner.of(with_limits(robot, {joint: Limits(low, high)}))
         answer = aspects.join(one, other)
         assert answer.verdict in (SAME, UNDECIDED)
         led.append(answer.verdict == SAME)
@@ -128,11 +128,11 @@ def test_paths_are_led_around_the_limits_that_others_pass(robot: Mechanism):
 
 def test_a_pose_beyond_a_limit_is_named_and_still_separated():
     robot = load("3rrr_m1")
-    free = Aspects.of(robot)
-    places = list(random_walk(free.setting.samples.start, 120, 0))
+    free = PathPlanner.of(robot)
+    places = list(random_walk(free.setup.samples.start, 120, 0))
     values = [coordinates(at, "elbow_1") for at in places]
     low, high = np.quantile(values, [0.2, 0.8])
-    aspects = Aspects.of(with_limits(robot, {"elbow_1": Limits(low, high)}))
+    aspects = PathPlanner.of(with_limits(robot, {"elbow_1": Limits(low, high)}))
     inside = [at for at, value in zip(places, values, strict=True) if low < value < high]
     outside = [at for at, value in zip(places, values, strict=True) if not low <= value <= high]
     verdicts = []
@@ -149,10 +149,12 @@ def test_a_pose_beyond_a_limit_is_named_and_still_separated():
 def test_a_rod_may_pass_length_zero_unless_it_is_limited(room: float | None):
     """Each rod of a 3-RPR turned over changes the sign, so poses are separated only where slides cannot pass zero."""
     robot, slides = load("3rpr_m1"), ("slide_1", "slide_2", "slide_3")
-    aspects = Aspects.of(robot if room is None else with_limits(robot, {name: Limits(-room, room) for name in slides}))
+    aspects = PathPlanner.of(
+        robot if room is None else with_limits(robot, {name: Limits(-room, room) for name in slides})
+    )
     near = [
         at
-        for at in random_walk(aspects.setting.samples.start, 150, 1)
+        for at in random_walk(aspects.setup.samples.start, 150, 1)
         if all(abs(coordinates(at, name)) < 0.24 for name in slides)
     ]
     values = aspects.condition.evaluate(aspects.structure.values_at(near))
@@ -164,8 +166,8 @@ def test_a_rod_may_pass_length_zero_unless_it_is_limited(room: float | None):
 @pytest.mark.some(1)
 @pytest.mark.parametrize("limits", [Limits(-4.0, 4.0), Limits(lower=-1.0)])
 def test_limits_that_are_not_considered_are_named(limits: Limits):
-    aspects = Aspects.of(with_limits(load("3rrr_m1"), {"elbow_1": limits, "elbow_2": Limits(-3.0, 3.0)}))
-    places = list(random_walk(aspects.setting.samples.start, 2, 0))
+    aspects = PathPlanner.of(with_limits(load("3rrr_m1"), {"elbow_1": limits, "elbow_2": Limits(-3.0, 3.0)}))
+    places = list(random_walk(aspects.setup.samples.start, 2, 0))
     answer = aspects.join(places[0], places[0])
     assert (answer.verdict, answer.limits) == (SAME, ("elbow_2",))
     assert answer.not_proved.startswith("limits of joints elbow_1; ")
@@ -173,9 +175,9 @@ def test_limits_that_are_not_considered_are_named(limits: Limits):
 
 def test_a_pose_on_a_limit_is_not_called_beyond_it():
     """A joint that rests on its stop where the path begins: nothing is proved, and it is not said to be beyond it."""
-    aspects = Aspects.of(with_limits(load("3rrr_m1"), {"elbow_1": Limits(0.0, 1.0)}))
-    others = random_walk(aspects.setting.samples.start, 40, 0)
+    aspects = PathPlanner.of(with_limits(load("3rrr_m1"), {"elbow_1": Limits(0.0, 1.0)}))
+    others = random_walk(aspects.setup.samples.start, 40, 0)
     goal = next(at for at in others if 0.01 < coordinates(at, "elbow_1") < 0.9)
-    answer = aspects.join(aspects.setting.samples.start, goal)
+    answer = aspects.join(aspects.setup.samples.start, goal)
     assert answer.verdict == UNDECIDED
     assert answer.reason == "at the start on its limits or beyond: joint elbow_1"

@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 import hrsynth
 from hrsynth.analysis.aspects.condition_enclosure import ConditionEnclosure
 from hrsynth.analysis.aspects.leg_forms import LegPattern
-from hrsynth.analysis.aspects.path import Aspects, PathAnswer
+from hrsynth.analysis.aspects.path import PathAnswer, PathPlanner
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.analysis.singularity.agreement import smallest_of
+from hrsynth.analysis.singularity.condition_check import smallest_of
 from hrsynth.constraints.condition import Named
 from hrsynth.description import load
 from hrsynth.geometry.balls import balls, below
 from hrsynth.geometry.so3 import exponential
 from hrsynth.geometry.vectors import pose
 from hrsynth.mechanism import Mechanism
-from hrsynth.mechanism.sights import CameraObservation
+from hrsynth.mechanism.cameras import CameraObservation
 
 Array = NDArray[np.float64]
 
@@ -55,7 +55,7 @@ def body(folder: Path) -> Mechanism:
 def test_what_is_enclosed_is_the_condition_of_the_configurations(name: str, robot: str, tmp_path: Path) -> None:
     """In numbers, and in balls, which hold the numbers."""
     given = body(tmp_path) if robot == "body" else load(robot)
-    aspects = Aspects.of(ObservedRobot.of(given, camera=EYE, see=SETS[name], samples=5))
+    aspects = PathPlanner.of(ObservedRobot.of(given, camera=EYE, see=SETS[name], samples=5))
     assert isinstance(aspects.condition, Named)
     assert isinstance(aspects.pattern, LegPattern), aspects.pattern
     assert not aspects.pattern.fitted
@@ -102,11 +102,11 @@ def image_sign(view: Array, X: Array) -> float:
     return float(np.sign(np.linalg.det(slope)) * np.prod(np.sign(Z)))
 
 
-def wrench_sign(setting: ObservedRobot, X: Array) -> float:
+def wrench_sign(setup: ObservedRobot, X: Array) -> float:
     """The sign of the determinant of the wrenches of lines, which change without jumps."""
     rows = [
         wrench
-        for o in setting.observed
+        for o in setup.observed
         if isinstance(o, CameraObservation)
         for wrench in o.wrenches(o.sighting(np.eye(4), X))
     ]
@@ -115,16 +115,16 @@ def wrench_sign(setting: ObservedRobot, X: Array) -> float:
 
 @pytest.mark.parametrize("name", ["points", "lines"])
 def test_the_sign_of_the_condition_is_that_of_a_determinant(name: str, tmp_path: Path) -> None:
-    setting = ObservedRobot.of(body(tmp_path), camera=EYE, see=SETS[name], samples=3)
-    aspects = Aspects.of(setting)
+    setup = ObservedRobot.of(body(tmp_path), camera=EYE, see=SETS[name], samples=3)
+    aspects = PathPlanner.of(setup)
     assert isinstance(aspects.pattern, LegPattern)
-    coordinates, enclosure = aspects.pattern.coordinates, aspects.enclosure(setting.everything.start)
+    coordinates, enclosure = aspects.pattern.coordinates, aspects.enclosure(setup.all_samples.start)
     rng, view = np.random.default_rng(0), camera()
     p = rng.normal(size=(300, 3)) * 0.5 + np.array([0.1, 0.05, 0.3])
     R = exponential(rng.normal(size=(300, 3)) * 2)
     found = np.sign(enclosure.at(p, R)[1])
     frames = [coordinates.frame(a, b) for a, b in zip(p, R, strict=True)]
-    expected = np.array([image_sign(view, X) if name == "points" else wrench_sign(setting, X) for X in frames])
+    expected = np.array([image_sign(view, X) if name == "points" else wrench_sign(setup, X) for X in frames])
     assert len({*found}) == 2
     assert abs(np.sum(found * expected)) == len(found)
 
@@ -133,7 +133,7 @@ def signs_along(answer: PathAnswer, view: Array) -> set[float]:
     """The determinant's signs at many poses of a path."""
     assert answer.coordinates is not None
     found = set()
-    for way in answer.ways:
+    for way in answer.segments:
         places, turns = way.at(np.linspace(0, 1, 300))[:2]
         found |= {image_sign(view, answer.coordinates.frame(p, R)) for p, R in zip(places, turns, strict=True)}
     return found
@@ -142,7 +142,7 @@ def signs_along(answer: PathAnswer, view: Array) -> set[float]:
 def test_a_second_pose_with_the_same_image_of_three_points_is_reached_without_a_singularity(tmp_path: Path) -> None:
     """The atlas of a body that nothing holds: its pairs are those of path; no sign of the determinant changes."""
     robot = body(tmp_path)
-    found = hrsynth.atlas(robot, camera=EYE, see=POINTS)
+    found = hrsynth.aspects(robot, camera=EYE, see=POINTS)
     assert len(found.places) == len(found.listed.modes) > 1
     for pair in found.pairs:
         if pair.answer is None:
@@ -162,15 +162,15 @@ def test_a_second_pose_with_the_same_image_of_three_points_is_reached_without_a_
 
 
 def test_opposite_signs_separate(tmp_path: Path) -> None:
-    setting = ObservedRobot.of(body(tmp_path), camera=EYE, see=LINES, samples=3)
+    setup = ObservedRobot.of(body(tmp_path), camera=EYE, see=LINES, samples=3)
     signs: dict[float, str] = {}
     rng = np.random.default_rng(4)
     for _ in range(40):
         x, y, z = rng.uniform(-0.3, 0.3, 2).tolist() + [float(rng.uniform(0.8, 1.4))]
         text = f"x={x:.3f},y={y:.3f},z={z:.3f},rpy=0/0/0"
-        signs.setdefault(wrench_sign(setting, pose([round(x, 3), round(y, 3), round(z, 3)])), text)
+        signs.setdefault(wrench_sign(setup, pose([round(x, 3), round(y, 3), round(z, 3)])), text)
     assert len(signs) == 2
-    found = hrsynth.path(setting, start=signs[1.0], goal=signs[-1.0])
+    found = hrsynth.path(setup, start=signs[1.0], goal=signs[-1.0])
     assert (found.verdict, found.certified) == ("separated", True)
     assert "has a value" in found.reason
     assert "behind a camera" in found.not_proved
@@ -183,11 +183,11 @@ def test_where_nothing_is_enclosed_the_way_is_sampled(tmp_path: Path) -> None:
         "example:panda", camera="hand=panda_hand@0,0,-0.3", samples=3, see=[f"point:world@{spot}" for spot in spots]
     )
     motors = ObservedRobot.of("3rrr_m1", "1", see=["encoder:shoulder_1", "encoder:shoulder_2"], samples=3)
-    for setting, start, goal in (
+    for setup, start, goal in (
         (arm, "x=0.3,y=0.1,z=0.5", "x=0.35,y=0.2,z=0.5"),
         (motors, "x=0,y=0,phi=0", "x=0.02,y=0,phi=0"),
     ):
-        found = hrsynth.path(setting, start=start, goal=goal)
+        found = hrsynth.path(setup, start=start, goal=goal)
         assert (found.verdict, found.certified) == ("undecided", False)
         assert found.road is not None
         assert found.road.reached == 1

@@ -9,19 +9,19 @@ import pytest
 
 from analysis.aspects.certified import check_certified
 from analysis.aspects.six_modes import LEGS, SixModes, determinants, six_modes, tips_at
-from hrsynth.analysis.aspects.path import BUDGET, Aspects, PathAnswer
+from hrsynth.analysis.aspects.path import BUDGET, PathAnswer, PathPlanner
 from hrsynth.analysis.aspects.path_segments import WorkingModeChange
-from hrsynth.analysis.aspects.words import SAME, SEPARATED, UNDECIDED
+from hrsynth.analysis.aspects.verdicts import SAME, SEPARATED, UNDECIDED
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import measure
 
 PAIRS = list(combinations(range(6), 2))
 
 
-def joined(instance: SixModes) -> tuple[Aspects, dict[tuple[int, int], PathAnswer], Array]:
+def joined(instance: SixModes) -> tuple[PathPlanner, dict[tuple[int, int], PathAnswer], Array]:
     """Answers for all pairs of modes, and the determinant at each mode (characteristic lengths)."""
-    aspects = Aspects.of(instance.robot)
-    places = instance.configurations(aspects.setting.samples.twin)
+    aspects = PathPlanner.of(instance.robot)
+    places = instance.configurations(aspects.setup.samples.model)
     values = determinants(instance, tips_at(instance, instance.poses), instance.ends) / instance.robot.length
     return aspects, {(i, j): aspects.join(places[i], places[j]) for i, j in PAIRS}, values
 
@@ -38,7 +38,7 @@ def check_path(instance: SixModes, answer: PathAnswer, pair: tuple[int, int], po
     branches = _sides(instance, tips_at(instance, instance.poses), instance.ends)
     branch, sign = branches[start].copy(), 0.0
     at = instance.poses[start]
-    for way in answer.ways:
+    for way in answer.segments:
         p, R, *leading = way.at(np.linspace(0, 1, points))
         X = np.array([carriage.frame(*each) for each in zip(p, R, strict=True)])
         assert np.max(np.abs(X[0] - at)) < 1e-9
@@ -114,11 +114,11 @@ def test_fifty_robots_with_six_modes():
 
 def test_all_six_modes_have_the_directions_that_are_watched():
     for instance in islice(six_modes(2), 3):
-        aspects = Aspects.of(instance.robot)
-        question = aspects.setting.samples.question
+        aspects = PathPlanner.of(instance.robot)
+        observation_model = aspects.setup.samples.observation_model
         seen = [
-            np.array(measure(at.twin, at.q, question.reference, question.observations)[2])
-            for at in instance.configurations(aspects.setting.samples.twin)
+            np.array(measure(at.model, at.q, observation_model.reference, observation_model.observations)[2])
+            for at in instance.configurations(aspects.setup.samples.model)
         ]
         assert np.max(np.abs(np.array(seen) - seen[0])) < 1e-9
         apart = [np.max(np.abs(one - two)) for one, two in combinations(instance.poses, 2)]

@@ -16,8 +16,8 @@ from hrsynth.analysis.observed import motors
 from hrsynth.geometry.vectors import Array, inverse
 from hrsynth.kinematics.configuration import ClosedConfiguration, measure
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
-from hrsynth.kinematics.relation import Measurement
 from hrsynth.kinematics.tasks import solve
+from hrsynth.kinematics.velocity_relation import ObservationModel
 from hrsynth.mechanism import Mechanism, Observation
 
 SAME = 1e-6
@@ -33,36 +33,36 @@ class Held:
     reference: str
     measured: Sequence[tuple[Observation, Array]]
 
-    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
-        _, _, values, rates = measure(twin, q, self.reference, [o for o, _ in self.measured])
+    def error_and_jacobian(self, model: PinocchioModel, q: Array) -> tuple[Array, Array]:
+        _, _, values, rates = measure(model, q, self.reference, [o for o, _ in self.measured])
         errors = [value - wanted for value, (_, wanted) in zip(values, self.measured, strict=True)]
         return np.concatenate(errors), np.vstack(rates)
 
 
-def asked(listed: AssemblyModes) -> Measurement:
+def asked(listed: AssemblyModes) -> ObservationModel:
     """What is held."""
-    return motors(listed.setting) if listed.kind == "real" else listed.setting.samples.question
+    return motors(listed.setup) if listed.kind == "real" else listed.setup.samples.observation_model
 
 
 def closings(listed: AssemblyModes, starts: int, seed: int = 0) -> list[ClosedConfiguration]:
     """Configurations with the goal's measured values, closed from random starts."""
-    goal, question = listed.goal, asked(listed)
-    values = measure(goal.twin, goal.q, question.reference, question.observations)[2]
-    held = Held(question.reference, tuple(zip(question.observations, values, strict=True)))
+    goal, observation_model = listed.goal, asked(listed)
+    values = measure(goal.model, goal.q, observation_model.reference, observation_model.observations)[2]
+    held = Held(observation_model.reference, tuple(zip(observation_model.observations, values, strict=True)))
     rng = np.random.default_rng(seed)
     found = []
     for number in range(starts):
         spread = SPREADS[number % len(SPREADS)]
-        start = goal.twin.integrate(goal.q, rng.uniform(-spread, spread, goal.twin.nv))
-        q, residual = solve(goal.twin, start, held, tolerance=1e-13, iterations=40)
+        start = goal.model.integrate(goal.q, rng.uniform(-spread, spread, goal.model.nv))
+        q, residual = solve(goal.model, start, held, tolerance=1e-13, iterations=40)
         if residual < 1e-11:
-            found.append(ClosedConfiguration.of(goal.twin, q))
+            found.append(ClosedConfiguration.of(goal.model, q))
     return found
 
 
 def bodies_of(listed: AssemblyModes, at: ClosedConfiguration) -> dict[str, Array]:
     """The poses of the bodies on which legs end."""
-    return {leg.attach: at.pose(leg.attach) for leg in listed.setting.anatomy.legs}
+    return {leg.platform_link: at.pose(leg.platform_link) for leg in listed.setup.decomposition.legs}
 
 
 def other_branch(listed: AssemblyModes, at: ClosedConfiguration) -> bool:
@@ -70,7 +70,7 @@ def other_branch(listed: AssemblyModes, at: ClosedConfiguration) -> bool:
     platform of a translating robot turn."""
     if listed.confined is None or listed.confined.motion not in ("translations", "bodies"):
         return False
-    if listed.setting.anatomy.point is not None:
+    if listed.setup.decomposition.point is not None:
         return False
     now, goal = bodies_of(listed, at), bodies_of(listed, listed.goal)
     return any(float(np.abs(now[body][:3, :3] - goal[body][:3, :3]).max()) > SAME for body in goal)
@@ -79,9 +79,9 @@ def other_branch(listed: AssemblyModes, at: ClosedConfiguration) -> bool:
 def distance(listed: AssemblyModes, mode: AssemblyMode, at: ClosedConfiguration) -> float:
     """How far the platform's bodies are from their poses in a mode; for a platform that is a point, the point."""
     assert mode.bodies is not None
-    point = listed.setting.anatomy.point
+    point = listed.setup.decomposition.point
     if point is not None:
-        platform = listed.setting.mechanism.platform
+        platform = listed.setup.mechanism.platform
         X, Y = at.pose(platform), mode.bodies[platform]
         return float(np.abs((X - Y) @ np.append(point, 1.0)).max())
     return max(float(np.abs(X - mode.bodies[body]).max()) for body, X in bodies_of(listed, at).items())
@@ -117,7 +117,7 @@ def compared(listed: AssemblyModes, starts: int, seed: int = 0) -> Comparison:
         len(found) - len(here),
         frozenset(met),
         tuple(missing),
-        tuple(sorted(k for k in met if listed.modes[k].open)),
+        tuple(sorted(k for k in met if listed.modes[k].unclosed_legs)),
     )
 
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hrsynth.analysis.modes.curves import Circle, Line, Plane, Point, Reach, Sphere
+from hrsynth.analysis.modes.loci import Circle, Line, Plane, Point, Reach, Sphere
 from hrsynth.analysis.modes.rigid import Planar, Spatial
 from hrsynth.analysis.modes.translating import Articulated, Translating
 from hrsynth.geometry.vectors import Array, pose, rotation_about, unit

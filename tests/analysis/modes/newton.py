@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from hrsynth.analysis.modes.curves import Circle, Curve, Line
+from hrsynth.analysis.modes.constrained_platform import System
+from hrsynth.analysis.modes.loci import Circle, Curve, Line
 from hrsynth.analysis.modes.rigid import Planar, Spatial
-from hrsynth.analysis.modes.systems import System
 from hrsynth.analysis.modes.translating import Articulated, Translating
 
 Batch = Any
@@ -97,7 +97,7 @@ def solutions(system: System, starts: int, rng: np.random.Generator, real: bool 
     found: list[Batch] = []
     for each in v[good]:
         twins = [each, np.r_[each[:3], -each[3:]]] if isinstance(system, Spatial) else [each]
-        if not any(np.abs(twin - other).max() < 1e-5 for twin in twins for other in found):
+        if not any(np.abs(model - other).max() < 1e-5 for model in twins for other in found):
             found.append(each)
     return np.array(found).reshape(-1, n)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from analysis.modes.draws import Draw
-from hrsynth.analysis.modes.curves import Circle, Line
+from hrsynth.analysis.modes.loci import Circle, Line
 from hrsynth.analysis.modes.solve import solve
 from hrsynth.geometry.vectors import Array, perpendicular, unit
 from hrsynth.mechanism import Mechanism

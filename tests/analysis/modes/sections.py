@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from flint import nmod_mat
 
-from hrsynth.analysis.modes.curves import Circle, Line, Plane, Sphere
+from hrsynth.analysis.modes.loci import Circle, Line, Plane, Sphere
 from hrsynth.analysis.modes.quadrics import normals
 from hrsynth.analysis.modes.rigid import Spatial
 

@@ -7,7 +7,7 @@ import pytest
 import sympy
 from flint import arb, ctx
 
-from hrsynth.analysis.modes.curves import Circle, Curve, Line, Point
+from hrsynth.analysis.modes.loci import Circle, Curve, Line, Point
 from hrsynth.analysis.modes.polynomials import Equation, cycle, krawczyk, pair
 from hrsynth.analysis.modes.rigid import Planar, Spatial
 from hrsynth.errors import BadRequest

@@ -12,10 +12,10 @@ from analysis.modes.ankles import LEGS, ankle, carried, counted
 from analysis.modes.test_robots import check_completeness, check_modes, same_modes
 from analysis.modes.test_surfaces import needs_msolve
 from hrsynth.analysis.measured import MeasuredRobot
-from hrsynth.analysis.modes.carried_modes import polish_zeros, proposals
-from hrsynth.analysis.modes.carrier import carried_platform as carried_platform
+from hrsynth.analysis.modes.carrying_leg import carried_platform as carried_platform
+from hrsynth.analysis.modes.carrying_leg_modes import polish_zeros, proposals
 from hrsynth.analysis.modes.joint_forms import closings_bound, eigenvalues
-from hrsynth.errors import NotConfined
+from hrsynth.errors import UnsupportedLocus
 from hrsynth.geometry.vectors import pose, rotation_about
 from hrsynth.mechanism.model import Motor
 from strategies import random_rotation, transformed
@@ -117,7 +117,7 @@ def test_three_joints_and_three_balls_have_their_number_of_modes(word: str, on: 
 def test_ranks_and_degrees_leave_the_same_number(word: str):
     for seed in range(2, 4):
         measured = MeasuredRobot.of_motors(hrsynth.observe(carried(word, seed)))
-        system = carried_platform(measured, measured.setting.everything.start, 1e-12)
+        system = carried_platform(measured, measured.setup.all_samples.start, 1e-12)
         counted = closings_bound(system, system.square)
         assert counted is not None
         assert counted.most == system.most(system.square)
@@ -135,7 +135,7 @@ def test_how_a_robot_stands_does_not_change_what_its_leg_leaves(seed: int):
     robot = robot.changed(joints=[replace(robot.joints[f"joint_{k}"], axes=(axis,)) for k in range(2)])
     R = random_rotation(rng)
     measured = MeasuredRobot.of_motors(hrsynth.observe(transformed(robot, R, rng.normal(size=3)), samples=4))
-    system = carried_platform(measured, measured.setting.everything.start, 1e-12)
+    system = carried_platform(measured, measured.setup.all_samples.start, 1e-12)
     counted = closings_bound(system, system.square)
     assert counted is not None
     assert counted.most == 6
@@ -148,8 +148,8 @@ def test_motors_on_all_joints_of_a_leg_leave_it_no_way():
     robot = carried("RR", 2)
     driven = robot.changed(joints=[replace(robot.joints[f"joint_{k}"], motor=Motor(f"motor_{k}")) for k in range(2)])
     measured = MeasuredRobot.of_motors(hrsynth.observe(driven, samples=4))
-    with pytest.raises(NotConfined):
-        carried_platform(measured, measured.setting.everything.start, 1e-12)
+    with pytest.raises(UnsupportedLocus):
+        carried_platform(measured, measured.setup.all_samples.start, 1e-12)
 
 
 @pytest.mark.long

@@ -13,7 +13,7 @@ from analysis.modes.laws import draw
 from analysis.modes.reached import six_ups, three_rrr, two_plates
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.analysis.modes.solve import solve
-from hrsynth.description import load, shipped
+from hrsynth.description import list_robots, load
 from hrsynth.mechanism import Mechanism
 from strategies import planar
 
@@ -68,7 +68,7 @@ def test_a_robot_reaches_the_bound(name: str, seed: int, count: int, robot: Call
 
 def test_a_symmetric_robot_reaches_eight():
     """The 3-RPS at its symmetric home: three poses lie over one root, and are told apart."""
-    found = modes(load(shipped()["3rps"]))
+    found = modes(load(list_robots()["3rps"]))
     assert found.found.complete
     assert found.found.complex == len(found.modes) == 8
     assert all(mode.reachable for mode in found.modes)
@@ -80,7 +80,7 @@ def shown(names: dict[str, int]) -> list[object]:
 
 @pytest.mark.parametrize("name", shown(PLANAR))
 def test_planar_hidden_robots_have_as_many_modes_as_the_paper_bounds(name: str):
-    found = modes(load(shipped()[name]))
+    found = modes(load(list_robots()[name]))
     assert found.found.complex == PLANAR[name]
     assert len(found.modes) in range(1 if PLANAR[name] == 1 else 2, PLANAR[name] + 1)
 
@@ -88,7 +88,7 @@ def test_planar_hidden_robots_have_as_many_modes_as_the_paper_bounds(name: str):
 @pytest.mark.some(1)
 @pytest.mark.parametrize("name", shown(UNDECIDED))
 def test_the_other_planar_hidden_robots_leave_a_continuum(name: str):
-    assert modes(load(shipped()[name])).found.continuum == UNDECIDED[name]
+    assert modes(load(list_robots()[name])).found.continuous_family == UNDECIDED[name]
 
 
 def member(word: str, seed: int) -> AssemblyModes:

@@ -7,12 +7,12 @@ import pytest
 
 from analysis.modes.drives import closings, driven
 from analysis.modes.pods import displacements, pods
-from hrsynth.analysis.modes.chain import Chain, ChainBody, Underived
-from hrsynth.analysis.modes.curves import Line
+from hrsynth.analysis.modes.loci import Line
+from hrsynth.analysis.modes.loci_from_joints import reaches
+from hrsynth.analysis.modes.locked_chain import Chain, ChainBody, LocusNotDerived
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
-from hrsynth.analysis.modes.reaches import reaches
+from hrsynth.catalog.architecture_key import parse
 from hrsynth.catalog.geometry import mechanism
-from hrsynth.catalog.words import parse
 from hrsynth.geometry.vectors import Array, cross, perpendicular, unit
 from hrsynth.mechanism.builder import Builder
 from strategies import ring
@@ -41,13 +41,13 @@ def check(words: tuple[str, ...], seed: int, complex_count: int | None, starts: 
     assert met
     assert None not in met
     assert found.modes[0].goal
-    assert not any(found.modes[k].open for k in met if k is not None)
+    assert not any(found.modes[k].unclosed_legs for k in met if k is not None)
     return found
 
 
 def nearest(found: AssemblyModes, D: Array) -> int | None:
     """The place of the mode to which the platform is displaced, or None."""
-    X = D @ found.setting.mechanism.links["platform"].pose
+    X = D @ found.setup.mechanism.links["platform"].pose
     apart = [float(np.abs(X - mode.bodies["platform"]).max()) for mode in found.modes if mode.bodies is not None]
     return int(np.argmin(apart)) if min(apart) < SAME else None
 
@@ -146,7 +146,7 @@ def test_an_offset_parts_the_two_lines_of_a_u():
         assert isinstance(other, Line)
         assert gain == 1.0 < more
         assert 1e-3 * offset < np.linalg.norm(one.miss(other.centre)) < 3 * offset
-    with pytest.raises(Underived, match="lie only"):
+    with pytest.raises(LocusNotDerived, match="lie only"):
         reaches(offset_u(1e-8))
 
 

@@ -7,7 +7,7 @@ import pytest
 import hrsynth
 from analysis.modes.pods import pods
 from hrsynth.analysis.modes.branches import solve_all
-from hrsynth.description import load, shipped
+from hrsynth.description import list_robots, load
 from hrsynth.errors import TooLarge
 
 
@@ -24,7 +24,7 @@ def test_fewer_branches_are_solved_with_less_effort_and_that_is_told():
 
 
 def test_a_system_that_needs_more_is_not_started():
-    robot = load(shipped()["hexa"])
+    robot = load(list_robots()["hexa"])
     confined = hrsynth.modes(robot, real=True).confined
     assert confined is not None
     with pytest.raises(TooLarge, match=r"6 legs and 6 freedoms, needs about 0\.4 s, more than the effort of 0\.1 s"):

@@ -12,7 +12,7 @@ from flint import arb, arb_mat, ctx
 from analysis.modes.digits import BITS, File, column, turned
 from hrsynth.analysis.modes.modes import AssemblyModes, drift, modes
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.description import load, shipped
+from hrsynth.description import list_robots, load
 from hrsynth.errors import PoseNotReached
 from hrsynth.geometry.vectors import pose
 from hrsynth.kinematics.configuration import ClosedConfiguration
@@ -47,37 +47,37 @@ def decimals(at: str) -> Decimals:
     return {name: tuple(value.split("/")) for name, _, value in (part.partition("=") for part in at.split(","))}
 
 
-def wanted(setting: ObservedRobot, at: Decimals) -> Callable[[Any], list[Any]]:
+def wanted(setup: ObservedRobot, at: Decimals) -> Callable[[Any], list[Any]]:
     """What a platform's pose misses of the numbers given."""
 
     def rows(poses: Any) -> list[Any]:
-        R, p = poses[setting.motion.link]
+        R, p = poses[setup.motion.link]
         found = [p["xyz".index(name), 0] - arb(at[name][0]) for name in at if name in "xyz"]
         if "rpy" in at:
             x, y, z = (turned([arb(i == k) for i in range(3)], arb(at["rpy"][k])) for k in range(3))
             found += (R - z * y * x).entries()
         if "phi" in at:
-            home = arb_mat(setting.motion.home[:3, :3].tolist())
-            found += (R - turned([arb(float(v)) for v in setting.motion.normal], arb(at["phi"][0])) * home).entries()
+            home = arb_mat(setup.motion.home[:3, :3].tolist())
+            found += (R - turned([arb(float(v)) for v in setup.motion.normal], arb(at["phi"][0])) * home).entries()
         return found
 
     return rows
 
 
-def missed(name: str, setting: ObservedRobot, at: Decimals, found: AssemblyModes) -> list[tuple[float, float]]:
+def missed(name: str, setup: ObservedRobot, at: Decimals, found: AssemblyModes) -> list[tuple[float, float]]:
     """For each proved mode at which the robot closes the part of its radius (of the shift, of the turn) at which the
     exact pose is."""
-    file = File(str(shipped()[name]))
+    file = File(str(list_robots()[name]))
 
     def start(at: ClosedConfiguration) -> dict[str, float]:
-        return file.start({link: at.pose(link) for link in at.twin.mechanism.links}, np.random.default_rng(0))
+        return file.start({link: at.pose(link) for link in at.model.mechanism.links}, np.random.default_rng(0))
 
-    q, left = file.solved(start(found.goal), wanted(setting, at))
+    q, left = file.solved(start(found.goal), wanted(setup, at))
     assert left < 1e-13
     with ctx.workprec(BITS):
         goal = file.poses(q)
         watched = [
-            (o.link, column([arb(float(v)) for v in o.direction])) for o in setting.observed if isinstance(o, Direction)
+            (o.link, column([arb(float(v)) for v in o.direction])) for o in setup.observed if isinstance(o, Direction)
         ]
         held = [(link, d, goal[link][0] * d) for link, d in watched]
     parts = []
@@ -90,7 +90,7 @@ def missed(name: str, setting: ObservedRobot, at: Decimals, found: AssemblyModes
         )
         assert left < 1e-13
         told = {link: mode.bodies[link] for link in mode.enclosed} or {
-            setting.motion.link: pose((mode.pose.x, mode.pose.y, mode.pose.z), mode.pose.rotation)
+            setup.motion.link: pose((mode.pose.x, mode.pose.y, mode.pose.z), mode.pose.rotation)
         }
         with ctx.workprec(BITS):
             exact = file.poses(q)
@@ -105,9 +105,9 @@ def missed(name: str, setting: ObservedRobot, at: Decimals, found: AssemblyModes
 @pytest.mark.some(1)
 @pytest.mark.parametrize(("name", "observe", "at"), QUICK)
 def test_the_exact_pose_is_within_the_radius(name: str, observe: tuple[str, ...] | None, at: str):
-    setting = ObservedRobot.of(load(shipped()[name]), observe)
-    found = modes(setting, at=at)
-    parts = missed(name, setting, decimals(at), found)
+    setup = ObservedRobot.of(load(list_robots()[name]), observe)
+    found = modes(setup, at=at)
+    parts = missed(name, setup, decimals(at), found)
     assert len(parts) >= sum(mode.configuration is not None for mode in found.modes) > 0
     assert max(max(each) for each in parts) < 1
     assert max(mode.radius for mode in found.modes) < 1e-9
@@ -116,24 +116,24 @@ def test_the_exact_pose_is_within_the_radius(name: str, observe: tuple[str, ...]
 @pytest.mark.long
 @pytest.mark.parametrize(("name", "observe", "count"), MANY)
 def test_the_exact_pose_is_within_the_radius_at_many_goals(name: str, observe: tuple[str, ...] | None, count: int):
-    setting = ObservedRobot.of(load(shipped()[name]), observe)
+    setup = ObservedRobot.of(load(list_robots()[name]), observe)
     rng, seen = np.random.default_rng(1), 0
     for _ in range(count):
-        at = goal_near_home(setting, rng)
+        at = goal_near_home(setup, rng)
         try:
-            found = modes(setting, at=Pose.parse(at))
+            found = modes(setup, at=Pose.parse(at))
         except PoseNotReached:
             continue
-        parts = missed(name, setting, decimals(at), found)
+        parts = missed(name, setup, decimals(at), found)
         seen += len(parts)
         assert max((max(each) for each in parts), default=0.0) < 1, at
     assert seen > 0
 
 
-def goal_near_home(setting: ObservedRobot, rng: np.random.Generator) -> str:
+def goal_near_home(setup: ObservedRobot, rng: np.random.Generator) -> str:
     """A pose with a few digits, of as many parts as there are freedoms."""
-    motion = setting.motion
-    home, length = motion.position(motion.home), setting.mechanism.length
+    motion = setup.motion
+    home, length = motion.position(motion.home), setup.mechanism.length
     given = [
         f"{name}={home['xyz'.index(name)] + length * rng.uniform(-0.1, 0.1):.3f}"
         for name in motion.parts
@@ -152,8 +152,8 @@ def goal_near_home(setting: ObservedRobot, rng: np.random.Generator) -> str:
 
 def test_a_goal_that_is_not_closed_drifts_by_what_it_misses():
     """The residual that is allowed counts, and near a fold nothing is known."""
-    setting = ObservedRobot.of(load(shipped()["gough_stewart"]), ("1", "4", "6"))
-    goal = setting.everything.start
-    off = ClosedConfiguration.of(goal.twin, goal.twin.integrate(goal.q, np.full(goal.twin.nv, 1e-12)))
-    assert drift(off) > drift(goal) + 0.3 * off.residual * goal.twin.length
+    setup = ObservedRobot.of(load(list_robots()["gough_stewart"]), ("1", "4", "6"))
+    goal = setup.all_samples.start
+    off = ClosedConfiguration.of(goal.model, goal.model.integrate(goal.q, np.full(goal.model.nv, 1e-12)))
+    assert drift(off) > drift(goal) + 0.3 * off.residual * goal.model.length
     assert drift(goal) < 1e-12

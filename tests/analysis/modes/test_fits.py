@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from analysis.modes.draws import Draw, Rng, on_two_bodies, planar, spatial, translating
-from hrsynth.analysis.modes.curves import Circle, shift_reach
+from hrsynth.analysis.modes.loci import Circle, shift_reach
 from hrsynth.analysis.modes.modes import modes
 from hrsynth.analysis.modes.rigid import Planar, Spatial
 from hrsynth.analysis.modes.solve import SystemModes, solve
 from hrsynth.analysis.modes.translating import Translating
-from hrsynth.description import load, shipped
+from hrsynth.description import list_robots, load
 from hrsynth.geometry.vectors import Array, unit
 from hrsynth.present.text.poses import modes as text
 from strategies import random_rotation
@@ -45,10 +45,10 @@ def test_the_goal_is_not_excluded_and_all_others_are(name: str):
         blind = solve(system, near=False)
         assert blind.complete, blind.proof
         assert listed(blind, goal)
-        assert [(mode.proved, mode.fits) for mode in blind.modes] == [(False, True)]
+        assert [(mode.proved, mode.match_residual) for mode in blind.modes] == [(False, True)]
         told = solve(system, near=False, goal=blind.modes[0].q)
         assert told.complete
-        assert [(mode.proved, mode.fits) for mode in told.modes] == [(True, False)]
+        assert [(mode.proved, mode.match_residual) for mode in told.modes] == [(True, False)]
 
 
 @pytest.mark.parametrize("name", MORE)
@@ -91,7 +91,7 @@ def test_a_goal_whose_solution_is_known_too_roughly_is_a_mode_all_the_same(name:
     found = solve(rough, near=False, goal=goal)
     assert not found.complete
     assert listed(found, X, 1e-6)
-    assert [(mode.proved, mode.fits) for mode in found.modes] == [(False, False)]
+    assert [(mode.proved, mode.match_residual) for mode in found.modes] == [(False, False)]
     assert solve(rough, near=False).modes == ()
 
 
@@ -112,7 +112,7 @@ def test_a_second_mode_by_symmetry_is_neither_proved_nor_excluded(seed: int):
     system, goal = mirrored(np.random.default_rng(seed))
     found = solve(system, goal=goal)
     assert found.complete
-    assert [(mode.proved, mode.fits) for mode in sorted(found.modes, key=lambda mode: not mode.proved)] == [
+    assert [(mode.proved, mode.match_residual) for mode in sorted(found.modes, key=lambda mode: not mode.proved)] == [
         (True, False),
         (False, True),
     ]
@@ -140,21 +140,21 @@ def test_tips_at_rest_that_are_torn_apart_leave_no_mode():
 def test_robots_with_more_legs_than_needed_do_not_prove_the_mirrored_mode(
     name: str, observe: tuple[str, ...] | None, at: str | None, expected: int
 ):
-    found = modes(load(shipped()[name]), observe, at=at)
+    found = modes(load(list_robots()[name]), observe, at=at)
     assert found.found.complete, found.found.proof
     assert len(found.modes) == expected
-    assert (found.modes[0].goal, found.modes[0].proved, found.modes[0].fits) == (True, True, None)
+    assert (found.modes[0].goal, found.modes[0].proved, found.modes[0].match_residual) == (True, True, None)
     record = found.to_dict()["modes"]
     for mode, told in zip(found.modes[1:], record[1:], strict=True):
         assert not told["proved"]
-        assert told["fits"] == mode.fits == mode.residual < 1e-12
+        assert told["match_residual"] == mode.match_residual == mode.residual < 1e-12
         assert "which does not prove it" in text(found)
 
 
 def test_the_pose_itself_is_a_mode_wherever_it_is_said_to_be():
     """Where its enclosure cannot be told to be its own: nothing is said against it."""
-    found = modes(load(shipped()["delta"]), at="x=0.05,y=0.02,z=-0.6")
-    first = replace(found.modes[0], proved=False, fits=1e-15)
+    found = modes(load(list_robots()["delta"]), at="x=0.05,y=0.02,z=-0.6")
+    first = replace(found.modes[0], proved=False, match_residual=1e-15)
     said = text(replace(found, modes=(first,)))
     assert "a mode by construction, its place not proved" in said
     assert "which does not prove it" not in said.split("mode 1")[1]

@@ -107,7 +107,7 @@ def test_a_distance_leaves_the_opposite_of_all_bearings():
 def test_a_flexible_formation_has_a_continuum_with_its_flexes(places: Array, bearings: Pairs, flexes: int):
     """A ring; and three on one line, whose decimals are not on one line as binary numbers."""
     found = modes(formation(places, bearings, bodies="position"))
-    assert (found.found.continuum, found.found.complete, found.modes) == (flexes, False, ())
+    assert (found.found.continuous_family, found.found.complete, found.modes) == (flexes, False, ())
     assert found.formation is not None
     assert sum(each.count for each in found.formation.flexes) == flexes
     assert f"a continuum of dimension {flexes}" in text(found)

@@ -9,11 +9,11 @@ import pytest
 
 from analysis.modes.draws import six_rods, spatial
 from analysis.modes.laws import among, needs_msolve
-from hrsynth.analysis.modes.curves import Line
-from hrsynth.analysis.modes.fits import as_meant
+from hrsynth.analysis.modes.loci import Line
+from hrsynth.analysis.modes.overdetermined import snap_centres
 from hrsynth.analysis.modes.rigid import Spatial
 from hrsynth.analysis.modes.solve import solve
-from hrsynth.errors import MeaningUndecided
+from hrsynth.errors import GeometryAmbiguous
 from hrsynth.geometry.vectors import Array
 from strategies import random_rotation
 
@@ -40,10 +40,10 @@ def test_balls_that_coincide_to_rounding_count_as_one(platform: str, base: str, 
     system, goal = six_rods(np.random.default_rng(3), platform, base, 1e-15)
     found = solve(system)
     assert found.complex == count
-    assert {frozenset(each.legs) for each in found.meant if each.where == "platform"} == {
+    assert {frozenset(each.legs) for each in found.snapped if each.where == "platform"} == {
         frozenset(k for k in range(6) if platform[k] == letter) for letter in "ABC" if platform.count(letter) > 1
     }
-    assert all(0 < each.defect < 1e-13 for each in found.meant)
+    assert all(0 < each.defect < 1e-13 for each in found.snapped)
     assert among(goal, found) < 1e-10
     assert all(mode.proved for mode in found.modes)
     assert not found.complete or found.bound == "class"
@@ -109,11 +109,11 @@ def test_what_may_be_meant_or_not_is_refused():
     tips[1] += (1e-6, 0, 0)
     tips[3] = tips[2] + (4e-5 * system.size, 0, 0)
     near = replace(system, tips=tips)
-    with pytest.raises(MeaningUndecided) as caught:
-        as_meant(near)
+    with pytest.raises(GeometryAmbiguous) as caught:
+        snap_centres(near)
     assert caught.value.exit_status == 3
     assert "--as-written" in str(caught.value)
-    assert as_meant(replace(near, as_written=True))[1] == ()
+    assert snap_centres(replace(near, as_written=True))[1] == ()
 
 
 @pytest.mark.parametrize("defect", [1e-16, 1e-12, 1e-8, 1e-6])
@@ -121,7 +121,7 @@ def test_what_is_meant_is_made_exact_and_its_error_is_kept(defect: float):
     system, _ = six_rods(np.random.default_rng(1), "AABCDE", "ABCDEF")
     tips = system.tips.copy()
     tips[1] += (defect, 0, 0)
-    exact, told = as_meant(replace(system, tips=tips))
+    exact, told = snap_centres(replace(system, tips=tips))
     assert np.array_equal(exact.tips[0], exact.tips[1])
     assert [each.legs for each in told] == [(0, 1)]
     assert exact.error >= told[0].defect == pytest.approx(defect, rel=0.5)
@@ -133,4 +133,4 @@ def test_what_is_far_apart_or_exact_is_left_as_it_is():
         six_rods(np.random.default_rng(1), "AABCDE", "ABCDEF").system,
         spatial(np.random.default_rng(0), "LLL").system,
     ):
-        assert as_meant(system) == (system, ())
+        assert snap_centres(system) == (system, ())

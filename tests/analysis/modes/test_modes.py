@@ -9,10 +9,10 @@ import sympy
 from analysis.modes.draws import FAMILIES, articulated, planar, spatial, translating
 from analysis.modes.laws import among, check_member, draw
 from analysis.modes.newton import pose_of, real_ones, solutions
-from hrsynth.analysis.modes.curves import Circle, Curve, Line, shift_reach
+from hrsynth.analysis.modes.constrained_platform import System
+from hrsynth.analysis.modes.loci import Circle, Curve, Line, shift_reach
 from hrsynth.analysis.modes.rigid import Planar, Spatial
 from hrsynth.analysis.modes.solve import SystemModes, solve
-from hrsynth.analysis.modes.systems import System
 from hrsynth.analysis.modes.translating import Articulated, Translating
 from hrsynth.geometry.vectors import Array, pose, rotation_about, unit
 from strategies import random_rotation
@@ -247,27 +247,27 @@ def test_a_continuum_is_said_and_not_listed(kind: str):
             "one centre": [Circle(centre, n, float(np.linalg.norm(point - centre))) for point in at],
         }
         modes = solve(Planar(tuple(curves[kind]), tips, X))
-        assert (modes.continuum, modes.complete, modes.modes) == (1, False, ())
-        assert "continuum of dimension 1" in str(modes.degenerate)
+        assert (modes.continuous_family, modes.complete, modes.modes) == (1, False, ())
+        assert "continuum of dimension 1" in str(modes.singular_solutions)
 
 
 def test_other_continua():
     rng = np.random.default_rng(0)
     d, tips, X = unit(rng.normal(size=3)), rng.normal(size=(3, 3)), pose(rng.normal(size=3), random_rotation(rng))
     lines = tuple(Line(X[:3, 3] + X[:3, :3] @ tip, d) for tip in tips)
-    assert solve(Spatial(lines, tips)).continuum == 1
+    assert solve(Spatial(lines, tips)).continuous_family == 1
     for seed in range(3):
-        assert solve(articulated(np.random.default_rng(seed), "CC", (0, 1, 2)).system).continuum == 1
-    assert solve(planar(rng, "CC").system).continuum == 1
-    assert solve(spatial(rng, "LL").system).continuum == 2
-    assert solve(translating(rng, "C").system).continuum == 1
+        assert solve(articulated(np.random.default_rng(seed), "CC", (0, 1, 2)).system).continuous_family == 1
+    assert solve(planar(rng, "CC").system).continuous_family == 1
+    assert solve(spatial(rng, "LL").system).continuous_family == 2
+    assert solve(translating(rng, "C").system).continuous_family == 1
 
 
 def test_tips_on_one_line_are_refused_in_words():
     tips = np.array([[0, 0, 0], [1, 1, 1], [2, 2, 2.0]])
     modes = solve(Spatial(tuple(Line(tip, (0.1 * k, 1, k)) for k, tip in enumerate(tips)), tips))
     assert not modes.complete
-    assert "on one line" in str(modes.degenerate)
+    assert "on one line" in str(modes.singular_solutions)
 
 
 @pytest.mark.parametrize("kind", ["L", "C"])
@@ -275,7 +275,7 @@ def test_a_singular_pose_is_said(kind: str):
     """Normals of three curves that meet in one point: a double solution, real or not as rounding has it."""
     for seed in range(8):
         modes = singular(kind, np.random.default_rng(seed))
-        assert "singular" in str(modes.degenerate)
+        assert "singular" in str(modes.singular_solutions)
         assert modes.complex == (2 if kind == "L" else 6)
         assert among(np.eye(4), modes) < 1e-6, modes.proof
 
@@ -288,7 +288,7 @@ def test_a_camera_that_sees_an_equilateral_triangle_has_eight_regular_modes(seed
     turns = 2 * np.pi / 3 * np.arange(3)
     tips = np.column_stack([np.cos(turns), np.sin(turns), 0 * turns])
     modes = solve(Spatial(tuple(Line(o, R @ (tip + (0, 0, 2.5))) for tip in tips), tips))
-    assert (modes.complex, len(modes.modes), modes.complete, modes.degenerate) == (8, 8, True, None)
+    assert (modes.complex, len(modes.modes), modes.complete, modes.singular_solutions) == (8, 8, True, None)
     assert all(mode.proved and mode.multiplicity == 1 and mode.radius < 1e-11 for mode in modes.modes)
 
 

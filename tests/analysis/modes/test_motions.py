@@ -10,8 +10,8 @@ import pytest
 
 import hrsynth
 from hrsynth.analysis.modes.modes import AssemblyModes
-from hrsynth.analysis.modes.motions import SelfMotion
-from hrsynth.description import load, shipped
+from hrsynth.analysis.modes.self_motions import SelfMotion
+from hrsynth.description import list_robots, load
 from hrsynth.geometry.vectors import Array, rotation_about, unit
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
@@ -59,7 +59,9 @@ def turned(angle: float) -> Array:
 def platforms(motion: SelfMotion) -> Array:
     """The displacements (n, 4, 4) of the platform along a motion, since the zero configuration."""
     at = motion.configuration
-    return np.array([each["platform"] @ np.linalg.inv(at.twin.mechanism.links["platform"].pose) for each in motion.way])
+    return np.array(
+        [each["platform"] @ np.linalg.inv(at.model.mechanism.links["platform"].pose) for each in motion.way]
+    )
 
 
 def lengths(motion: SelfMotion, anchors: Array, tips: Array) -> Array:
@@ -72,9 +74,9 @@ def check_found(found: AssemblyModes, motion: SelfMotion, anchors: Array, tips: 
     assert np.abs(lengths(motion, anchors, tips) - np.linalg.norm(tips - anchors, axis=1)).max() < 1e-9
     assert not found.found.complete
     assert found.found.complex is None
-    assert found.found.continuum == max(each.dimension for each in found.motions)
+    assert found.found.continuous_family == max(each.dimension for each in found.self_motions)
     assert "found, not proved: a self-motion" in hrsynth.text(found)
-    assert set(motion.links) == set(motion.configuration.twin.mechanism.links) - {"base"}
+    assert set(motion.links) == set(motion.configuration.model.mechanism.links) - {"base"}
 
 
 @pytest.mark.some(1)
@@ -87,7 +89,7 @@ def test_equal_parallel_legs_carry_a_congruent_platform_on_a_circle(seed: int):
     B = A + r * turned(rng.uniform(0, 6)) @ [1.0, 0.0]
     anchors, tips = flat(A, tilt), flat(B, tilt)
     found = hrsynth.modes(pod(anchors, tips, "R", "R", tilt[:, 2]), real=True)
-    (motion,) = found.motions
+    (motion,) = found.self_motions
     check_found(found, motion, anchors, tips)
     assert (motion.goal, motion.dimension, motion.returns, motion.turn) == (True, 1, True, 0.0)
     assert motion.shift == pytest.approx(2 * math.pi * r, rel=0.01)
@@ -106,7 +108,7 @@ def test_a_self_motion_away_from_the_pose_is_found():
     A, angle = triangle(rng), 0.9
     anchors, tips = flat(A, tilt), flat(A @ turned(angle).T, tilt)
     found = hrsynth.modes(pod(anchors, tips, "R", "R", tilt[:, 2]), real=True)
-    (motion,) = found.motions
+    (motion,) = found.self_motions
     check_found(found, motion, anchors, tips)
     assert (motion.goal, motion.dimension, motion.returns) == (False, 1, True)
     assert motion.shift == pytest.approx(2 * math.pi * 2 * 0.5 * math.sin(angle / 2), rel=0.01)
@@ -124,7 +126,7 @@ def test_an_octahedron_of_bricard_moves():
     anchors = np.array([corners[i] for i, _ in pairs]) @ tilt.T
     tips = np.array([opposite[j] for _, j in pairs]) @ tilt.T
     found = hrsynth.modes(pod(anchors, tips, "U", "S", unit(rng.normal(size=3))), real=True)
-    motion = next(each for each in found.motions if each.goal)
+    motion = next(each for each in found.self_motions if each.goal)
     check_found(found, motion, anchors, tips)
     assert motion.dimension == 1
     assert motion.turn > 0.2
@@ -136,7 +138,7 @@ def test_equal_parallel_legs_in_space_carry_a_congruent_platform_on_a_sphere():
     rng, tilt = tilted(5)
     anchors, way = rng.uniform(-0.4, 0.4, (6, 3)) @ tilt.T, rng.uniform(0.2, 0.5, 3)
     found = hrsynth.modes(pod(anchors, anchors + way, "U", "S", unit(rng.normal(size=3))), real=True)
-    motion = next(each for each in found.motions if each.goal)
+    motion = next(each for each in found.self_motions if each.goal)
     check_found(found, motion, anchors, anchors + way)
     assert motion.dimension == 2
     assert np.linalg.norm(platforms(motion)[:, :3, 3] + way, axis=1) == pytest.approx(np.linalg.norm(way), abs=1e-9)
@@ -151,10 +153,10 @@ def test_a_platform_on_points_of_similar_conics_moves_generically():
     D = rotation_about(rng.normal(size=3), 0.4)
     anchors, tips = A @ tilt.T, (0.6 * A @ D.T + [0.05, 0.02, 0.4]) @ tilt.T
     found = hrsynth.modes(pod(anchors, tips, "U", "S", unit(rng.normal(size=3))), real=True)
-    (motion,) = found.motions
-    assert found.found.continuum == motion.dimension == 1
+    (motion,) = found.self_motions
+    assert found.found.continuous_family == motion.dimension == 1
     assert np.abs(lengths(motion, anchors, tips) - np.linalg.norm(tips - anchors, axis=1)).max() < 1e-9
-    assert "leave 1 of the platform's freedoms undetermined" in str(found.found.degenerate)
+    assert "leave 1 of the platform's freedoms undetermined" in str(found.found.singular_solutions)
 
 
 def test_two_circles_in_one_move_a_five_bar():
@@ -172,17 +174,17 @@ def test_two_circles_in_one_move_a_five_bar():
     b.joint("tip", "R", "rod_1", "rod_2", at=flat(np.array([tip + arm]), tilt)[0], axis=tilt[:, 2], loop=True)
     robot = b.build(platform="rod_1")
     found = hrsynth.modes(robot)
-    (motion,) = found.motions
+    (motion,) = found.self_motions
     assert (motion.goal, motion.dimension, motion.returns) == (True, 1, True)
     assert motion.shift == pytest.approx(2 * math.pi * np.linalg.norm(arm), rel=0.01)
     assert found.modes == ()
-    assert (motion.beyond, motion.to_dict()["within_m"]) == ((), motion.shift)
+    assert (motion.beyond_limits, motion.to_dict()["within_m"]) == ((), motion.shift)
     # both arms turn alike: with the first held to 0.7 rad either way, the tip goes as far on its circle
     arm_1 = replace(robot.joints["shoulder_1"], limits=Limits(-0.7, 0.7))
     ended = hrsynth.modes(robot.changed(joints=[arm_1]))
-    assert ended.motions[0].beyond == ("shoulder_1",)
-    assert ended.motions[0].shift == motion.shift
-    assert ended.motions[0].inside == (pytest.approx(1.4 * np.linalg.norm(arm), rel=0.15), 0.0)
+    assert ended.self_motions[0].beyond_limits == ("shoulder_1",)
+    assert ended.self_motions[0].shift == motion.shift
+    assert ended.self_motions[0].inside == (pytest.approx(1.4 * np.linalg.norm(arm), rel=0.15), 0.0)
     assert "until it came back, beyond the limits of shoulder_1; within all limits over 0." in hrsynth.text(ended)
 
 
@@ -194,9 +196,9 @@ def test_a_singular_pose_is_no_self_motion():
     centre, reach = np.array([0.1, 0.05]), np.array([0.4, 0.55, 0.7])
     B = A + reach[:, None] * (centre - A)
     found = hrsynth.modes(pod(flat(A, tilt), flat(B, tilt), "R", "R", tilt[:, 2]), real=True)
-    assert found.motions == ()
-    assert found.found.continuum is None
-    assert "singular pose" in str(found.found.degenerate)
+    assert found.self_motions == ()
+    assert found.found.continuous_family is None
+    assert "singular pose" in str(found.found.singular_solutions)
     assert sum(mode.goal for mode in found.modes) == 1
 
 
@@ -207,8 +209,8 @@ def test_a_singular_pose_is_no_self_motion():
 )
 def test_freedoms_that_are_never_seen_are_moved(name: str, observe: str | None):
     """As many ways to move as the rank at other configurations leaves."""
-    found = hrsynth.modes(load(shipped()[name]), observe)
-    (motion,) = found.motions
-    assert motion.dimension == found.found.continuum
+    found = hrsynth.modes(load(list_robots()[name]), observe)
+    (motion,) = found.self_motions
+    assert motion.dimension == found.found.continuous_family
     assert motion.goal
     assert "a continuum" in found.count

@@ -7,9 +7,9 @@ import pytest
 
 import hrsynth
 from analysis.modes.laws import needs_msolve
-from hrsynth.analysis.modes.multiples import combine_quadrics, most_zeros
+from hrsynth.analysis.modes.modular_root_bound import combine_quadrics, most_zeros
 from hrsynth.analysis.modes.polynomials import Quadric
-from hrsynth.description import load, shipped
+from hrsynth.description import list_robots, load
 from strategies import random_rotation, transformed
 
 HEIGHT = 1000
@@ -75,7 +75,7 @@ def test_combinations_have_the_same_zeros():
 )
 def test_motors_of_two_bodies_that_translate_have_a_proved_list(name, count, seed):
     """Their arms are symmetric: solutions lie at infinity, or far away but for rounding in a turned base."""
-    robot = load(shipped()[name])
+    robot = load(list_robots()[name])
     if seed is not None:
         rng = np.random.default_rng(seed)
         robot = transformed(robot, random_rotation(rng), rng.normal(size=3))

@@ -12,15 +12,15 @@ from scipy.optimize import minimize_scalar
 
 import hrsynth
 from description.foreign.rounded import exported, of_hinges
-from hrsynth.analysis.asked import configurations_at
 from hrsynth.analysis.modes.modes import AssemblyModes
 from hrsynth.analysis.modes.near import descend, measurement_bound
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.description import load, shipped
-from hrsynth.errors import BadRequest, NotConfined
+from hrsynth.analysis.pose_requests import configurations_at
+from hrsynth.description import list_robots, load
+from hrsynth.errors import BadRequest, UnsupportedLocus
 from hrsynth.geometry.vectors import angle_between, pose, rotation_about, unit
 from hrsynth.kinematics.configuration import ClosedConfiguration, measure
-from hrsynth.kinematics.tasks import Held
+from hrsynth.kinematics.tasks import FixedValuesTask
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.pose import Pose
 from hrsynth.present.report.answer import answer
@@ -54,7 +54,7 @@ def rounded(robot: Mechanism, path: Path, digits: int) -> Mechanism:
 
 def how_many(found: AssemblyModes) -> int | None:
     """How many poses look the same; None where they fill a continuum."""
-    return None if found.found.continuum is not None else len(found.modes) + len(found.near)
+    return None if found.found.continuous_family is not None else len(found.modes) + len(found.near_modes)
 
 
 @cache
@@ -71,7 +71,7 @@ def cad(tmp_path_factory: pytest.TempPathFactory) -> Mechanism:
 @pytest.mark.some(6, 60)
 @pytest.mark.parametrize("digits", [6, 9, 7, 5])
 @pytest.mark.parametrize(
-    "name", ["delta", "quattro", "3ruu", *(each for each in shipped() if each not in ("delta", "quattro", "3ruu"))]
+    "name", ["delta", "quattro", "3ruu", *(each for each in list_robots() if each not in ("delta", "quattro", "3ruu"))]
 )
 def test_a_rounded_robot_has_as_many_poses_that_look_the_same(name: str, digits: int, tmp_path: Path):
     robot = load(name)
@@ -80,10 +80,10 @@ def test_a_rounded_robot_has_as_many_poses_that_look_the_same(name: str, digits:
 
 def test_what_is_told_of_a_near_mode_is_so(cad: Mechanism):
     found = hrsynth.modes(cad)
-    (near,) = found.near
+    (near,) = found.near_modes
     at = near.configuration
     seen = [
-        measure(each.twin, each.q, found.setting.mechanism.base, found.setting.observed)[2] for each in (found.goal, at)
+        measure(each.model, each.q, found.setup.mechanism.base, found.setup.observed)[2] for each in (found.goal, at)
     ]
     angles = [angle_between(one, other) for one, other in zip(*seen, strict=True)]
     assert 0 < near.angle < np.radians(1e-3)
@@ -91,14 +91,14 @@ def test_what_is_told_of_a_near_mode_is_so(cad: Mechanism):
     apart = at.pose("platform")[:3, 3] - found.goal.pose("platform")[:3, 3]
     assert np.linalg.norm(apart) == pytest.approx(near.distance) == pytest.approx(0.239, abs=1e-3)
     assert near.stable
-    assert np.linalg.norm(at.twin.residual(at.q)) < 1e-10
+    assert np.linalg.norm(at.model.residual(at.q)) < 1e-10
 
 
 def test_the_bound_is_that_of_the_measurement(cad: Mechanism):
-    (near,) = hrsynth.modes(cad).near
-    assert hrsynth.modes(cad, cone=0).near == hrsynth.modes(cad, cone="0deg").near == ()
-    assert hrsynth.modes(cad, cone=0.9 * near.angle).near == ()
-    assert len(hrsynth.modes(cad, cone=1.1 * near.angle).near) == 1
+    (near,) = hrsynth.modes(cad).near_modes
+    assert hrsynth.modes(cad, cone=0).near_modes == hrsynth.modes(cad, cone="0deg").near_modes == ()
+    assert hrsynth.modes(cad, cone=0.9 * near.angle).near_modes == ()
+    assert len(hrsynth.modes(cad, cone=1.1 * near.angle).near_modes) == 1
     for wrong in ("-1deg", "far", 2.0, -0.1):
         with pytest.raises(BadRequest):
             measurement_bound(wrong)
@@ -111,56 +111,56 @@ def test_every_answer_counts_it(cad: Mechanism):
     assert words in found.headline()
     assert words in str(found)
     assert found.to_dict()["near_modes"][0]["stable"] is True
-    assert "one other pose, 24 cm away" in rest(found.setting)[1]
+    assert "one other pose, 24 cm away" in rest(found.setup)[1]
     assert any(words in each for each in answer(derived, Parts(left, left, found, left)))
 
 
 @pytest.mark.slow
 def test_a_search_finds_what_a_list_proposes(cad: Mechanism, monkeypatch: pytest.MonkeyPatch):
-    (listed,) = hrsynth.modes(cad).near
+    (listed,) = hrsynth.modes(cad).near_modes
 
     def refuse(*_: object) -> None:
-        raise NotConfined("delta", "no list is to be made")
+        raise UnsupportedLocus("delta", "no list is to be made")
 
     monkeypatch.setattr("hrsynth.analysis.modes.modes._modes_by_system", refuse)
-    hrsynth.forget()
-    (met,) = hrsynth.modes(cad).near
+    hrsynth.clear_cache()
+    (met,) = hrsynth.modes(cad).near_modes
     assert met.stable
     assert met.angle == pytest.approx(listed.angle, rel=1e-4)
     assert met.distance == pytest.approx(listed.distance, rel=1e-6)
-    hrsynth.forget()
+    hrsynth.clear_cache()
 
 
 @pytest.mark.slow
 def test_a_run_of_the_loop_ends_at_a_near_mode(cad: Mechanism):
     found = hrsynth.modes(cad)
-    (near,) = found.near
+    (near,) = found.near_modes
     beside = replace(near.pose, x=near.pose.x + 0.01, z=near.pose.z - 0.01)
     run = hrsynth.servo(cad, start=beside.without(["rpy"]), goal=found.pose.without(["rpy"]))
-    assert run.ended != "goal"
-    assert "near mode 1 of the goal" in run.ending.reason
+    assert run.outcome != "goal"
+    assert "near mode 1 of the goal" in run.run_outcome.reason
     assert np.linalg.norm([run.pose.x - near.pose.x, run.pose.y - near.pose.y, run.pose.z - near.pose.z]) < 1e-4
 
 
 def test_a_stationary_difference_is_a_near_mode_only_where_it_is_least():
     """Of a Delta on its axis: beside its two modes, at both, and exactly between them, where the difference is
     stationary too, greatest along the axis."""
-    setting = ObservedRobot.of("delta")
-    goal, question = setting.everything.start, setting.samples.question
-    held = Held.at(goal.twin, goal.q, question.reference, question.observations)
-    low, high = (mode.pose.z for mode in hrsynth.modes(setting).modes)
+    setup = ObservedRobot.of("delta")
+    goal, observation_model = setup.all_samples.start, setup.samples.observation_model
+    held = FixedValuesTask.at(goal.model, goal.q, observation_model.reference, observation_model.observations)
+    low, high = (mode.pose.z for mode in hrsynth.modes(setup).modes)
 
     def at(z: float) -> ClosedConfiguration:
-        return configurations_at(setting, [Pose(x=0.0, y=0.0, z=z)])[0]
+        return configurations_at(setup, [Pose(x=0.0, y=0.0, z=z)])[0]
 
     top = minimize_scalar(
-        lambda z: -np.linalg.norm(held.rows(goal.twin, at(z).q)[0]),
+        lambda z: -np.linalg.norm(held.error_and_jacobian(goal.model, at(z).q)[0]),
         bounds=(low, high),
         method="bounded",
         options={"xatol": 1e-8},
     ).x
     for z, least in ((low + 0.02, True), (top, False), (high - 0.02, True)):
-        found = descend(at(z), question, held, np.radians(0.1))
+        found = descend(at(z), observation_model, held, np.radians(0.1))
         assert found is not None
         assert (found.isolated, found.family, found.angle < 1e-9) == (least, False, least)
 
@@ -168,15 +168,15 @@ def test_a_stationary_difference_is_a_near_mode_only_where_it_is_least():
 @pytest.mark.parametrize("name", ["prrrp_parallel", "prrrp_parallel_point"])
 def test_poses_that_fill_a_curve_are_a_family_and_attract_to_no_pose(name: str):
     """Along parallel slides the directions stay the same; across them they do not."""
-    setting = ObservedRobot.of(name)
-    goal, question = setting.everything.start, setting.samples.question
-    held = Held.at(goal.twin, goal.q, question.reference, question.observations)
-    home = setting.motion.position(goal.pose(setting.motion.link))
+    setup = ObservedRobot.of(name)
+    goal, observation_model = setup.all_samples.start, setup.samples.observation_model
+    held = FixedValuesTask.at(goal.model, goal.q, observation_model.reference, observation_model.observations)
+    home = setup.motion.position(goal.pose(setup.motion.link))
     for x, y in ((0.0, 0.0), (0.0, 0.05), (0.02, 0.05)):
-        beside = configurations_at(setting, [Pose(x=home[0] + x, y=home[1] + y)])[0]
-        found = descend(beside, question, held, 1e-6)
+        beside = configurations_at(setup, [Pose(x=home[0] + x, y=home[1] + y)])[0]
+        found = descend(beside, observation_model, held, 1e-6)
         assert found is not None
         assert (found.isolated, found.family) == (False, True)
         assert found.angle < 1e-9
-        there = setting.motion.position(found.configuration.pose(setting.motion.link))
+        there = setup.motion.position(found.configuration.pose(setup.motion.link))
         assert there[0] == pytest.approx(home[0], abs=1e-6)

@@ -15,7 +15,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
-from hrsynth.description import load, shipped
+from hrsynth.description import list_robots, load
 from hrsynth.geometry.vectors import Array
 from tables import printed as table
 from tables.markdown import block
@@ -137,7 +137,7 @@ def test_the_second_modes_have_other_digits_than_printed(legs, z, printed_z, rea
     assert (mode.pose.x, mode.pose.y) == pytest.approx((-0.2, 0.0), abs=1e-9)
     assert abs(mode.pose.z - printed_z) > 5e-3
     assert mode.reachable is reachable
-    assert reachable or set(mode.open) == {"1", "4"}
+    assert reachable or set(mode.unclosed_legs) == {"1", "4"}
 
 
 @pytest.mark.parametrize(("legs", "off"), [(("1", "4"), "4"), (("2", "3"), "3")])
@@ -177,11 +177,11 @@ def test_the_error_of_all_legs_is_stationary_at_the_goal_alone():
             lambda q: (rods("quattro", q) - wanted).ravel(), start, xtol=1e-15, ftol=1e-15, gtol=1e-15
         )
         assert np.allclose(result.x, goal, atol=1e-6)
-    assert listed(next(c for c in CLAIMS if len(c.legs) == 4)).near == ()
+    assert listed(next(c for c in CLAIMS if len(c.legs) == 4)).near_modes == ()
 
 
 def test_on_the_axis_two_poses_do_share_all_four_directions():
-    found = modes(load(shipped()["quattro"]), at="x=0,y=0,z=-0.59")
+    found = modes(load(list_robots()["quattro"]), at="x=0,y=0,z=-0.59")
     assert found.found.complete
     assert len(found.modes) == 2
     heights = sorted(m.pose.z for m in found.modes)

@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from hrsynth.analysis.modes.curves import Circle, Line, Point
+from hrsynth.analysis.modes.loci import Circle, Line, Point
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.cli import execute
-from hrsynth.description import load, shipped
+from hrsynth.description import list_robots, load
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.vectors import rotation_about
 from hrsynth.present.coupler import chains, points, swept, trace_coupler
@@ -50,7 +50,7 @@ rng_of = np.random.default_rng
 
 @cache
 def found(name: str, observe: str | None = None, real: bool = False) -> AssemblyModes:
-    return modes(load(shipped()[name]), observe, real=real)
+    return modes(load(list_robots()[name]), observe, real=real)
 
 
 @cache
@@ -75,7 +75,7 @@ def apart(point: np.ndarray, curve: np.ndarray, normal: np.ndarray | None) -> fl
 @pytest.mark.some(2)
 @MANY
 def test_modes_are_where_the_curves_meet(name: str, observe: str | None, real: bool):
-    view, size = drawn(name, observe, real), found(name, observe, real).goal.twin.length
+    view, size = drawn(name, observe, real), found(name, observe, real).goal.model.length
     assert view.traces
     alone = [trace for trace in view.traces if not trace.moving]
     for placed in view.placed:
@@ -95,7 +95,7 @@ def test_numbers_states_and_words_are_the_texts(name: str, observe: str | None, 
     assert [each.label for each in view.placed] == re.findall(r"^mode (\d+) ", said, re.MULTILINE)
     for placed, mode in zip(view.placed, result.modes, strict=True):
         assert placed.state == (GOAL if mode.goal else CLOSES if mode.reachable else OPEN)
-        assert all(leg in placed.words for leg in mode.open)
+        assert all(leg in placed.words for leg in mode.unclosed_legs)
         assert bool(placed.strokes) == (mode.configuration is not None)
 
 
@@ -104,7 +104,7 @@ def test_numbers_states_and_words_are_the_texts(name: str, observe: str | None, 
 def test_strokes_keep_their_lengths_and_the_base_its_place(name: str, observe: str | None, real: bool):
     """Links are rigid: each polygon is congruent at all modes; each leg begins at the base."""
     result, view = found(name, observe, real), drawn(name, observe, real)
-    slides = sum(joint.type.slides for joint in result.goal.twin.mechanism.joints.values())
+    slides = sum(joint.type.slides for joint in result.goal.model.mechanism.joints.values())
     shapes = [
         sorted(
             round(float(np.linalg.norm(np.diff(ring, axis=0), axis=1).sum()), 6)
@@ -134,7 +134,7 @@ def test_a_robot_that_does_not_close_is_drawn_as_its_platform_alone():
 def test_a_tilted_robot_is_drawn_tilted(name: str, observe: str | None):
     rng = rng_of(5)
     R, p = random_rotation(rng), rng.normal(size=3)
-    moved = scene(modes(transformed(load(shipped()[name]), R, p), observe))
+    moved = scene(modes(transformed(load(list_robots()[name]), R, p), observe))
     view = drawn(name, observe)
     spots = sorted(np.round(R @ each.at + p, 6).tolist() for each in view.placed)
     assert sorted(np.round(each.at, 6).tolist() for each in moved.placed) == pytest.approx(np.array(spots), abs=2e-6)
@@ -153,7 +153,7 @@ def test_where_tips_are_on_surfaces_or_unknown_the_platforms_are_drawn():
 
 def test_near_modes_have_their_own_mark():
     result = found("gough_stewart", "1,3,5")
-    near = replace(result, modes=result.modes[:1], near=result.modes[1:])
+    near = replace(result, modes=result.modes[:1], near_modes=result.modes[1:])
     assert [(each.label, each.state) for each in scene(near).placed] == [("1", GOAL), ("near 1", NEAR)]
     assert len({mark for mark, _, _ in MARKS.values()}) == len(MARKS)
 
@@ -356,8 +356,8 @@ def test_kept_pictures_are_fresh_and_small(file: Path):
     _, robot, *options = shlex.split(commands()[file.name])
     valued = [option for option in options if option != "--real"]
     given = dict(zip(valued[::2], valued[1::2], strict=True))
-    result = modes(load(shipped()[robot]), given.get("--observe"), at=given.get("--at"), real="--real" in options)
+    result = modes(load(list_robots()[robot]), given.get("--observe"), at=given.get("--at"), real="--real" in options)
     fresh, kept = json.loads(json.dumps(description(result, drawable(result)))), held(file)
     assert words(fresh) == words(kept), "stale: make pictures"
-    assert numbers(fresh) == pytest.approx(numbers(kept), abs=1e-6 * result.goal.twin.length), "stale: make pictures"
+    assert numbers(fresh) == pytest.approx(numbers(kept), abs=1e-6 * result.goal.model.length), "stale: make pictures"
     assert file.stat().st_size < 150_000

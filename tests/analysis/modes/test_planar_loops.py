@@ -14,16 +14,16 @@ import hrsynth
 from analysis.modes.gears import closings, five_bar, linkage
 from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.modes.modes import AssemblyModes
-from hrsynth.analysis.modes.multiples import Residues
+from hrsynth.analysis.modes.modular_root_bound import Residues
 from hrsynth.analysis.modes.planar_loops import blocks
 from hrsynth.analysis.modes.planar_modes import solve_loops
 from hrsynth.analysis.modes.planar_reading import planar_loops, whole_kernel
 from hrsynth.analysis.modes.search import search
+from hrsynth.catalog.architecture_key import parse
 from hrsynth.catalog.geometry import mechanism
-from hrsynth.catalog.words import parse
 from hrsynth.constraints.pattern import leg_ends, placing_links
-from hrsynth.description import load, shipped
-from hrsynth.errors import NotConfined, Unsolved
+from hrsynth.description import list_robots, load
+from hrsynth.errors import SystemNotSolved, UnsupportedLocus
 from hrsynth.geometry.vectors import pose_difference
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
@@ -35,7 +35,7 @@ QUICK = {"rrrrr_m1", "3rrr_m1", "3rpr_m2", "3prp", "prrrp_m1", "rprpr_m2"}
 def planar() -> list[str]:
     """The shipped robots whose joints turn about one direction and slide across it."""
     found = []
-    for name, path in shipped().items():
+    for name, path in list_robots().items():
         joints = load(path).joints.values()
         axes = [joint.axis for joint in joints if joint.type.value == "R"]
         if axes and all(
@@ -47,7 +47,7 @@ def planar() -> list[str]:
 
 
 def measured(found: AssemblyModes) -> MeasuredRobot:
-    return (MeasuredRobot.of_motors if found.kind == "real" else MeasuredRobot.of_directions)(found.setting)
+    return (MeasuredRobot.of_motors if found.kind == "real" else MeasuredRobot.of_directions)(found.setup)
 
 
 @pytest.mark.some(2)
@@ -58,8 +58,8 @@ def measured(found: AssemblyModes) -> MeasuredRobot:
 def test_loops_and_tips_agree(name: str, real: bool):
     """The general way shares neither unknowns nor solver with the others."""
     listed = hrsynth.modes(name, real=real)
-    if listed.found.continuum is not None:
-        with pytest.raises((NotConfined, Unsolved)):
+    if listed.found.continuous_family is not None:
+        with pytest.raises((UnsupportedLocus, SystemNotSolved)):
             solve_loops(measured(listed), listed.goal)
         return
     made, found = solve_loops(measured(listed), listed.goal)
@@ -67,13 +67,13 @@ def test_loops_and_tips_agree(name: str, real: bool):
     assert found.complete
     assert found.complex == listed.found.complex
     assert len(found.modes) == len(listed.modes) + len(listed.antipodal)
-    length = listed.goal.twin.length
+    length = listed.goal.model.length
     for mode in listed.modes:
         assert mode.bodies is not None
         assert (
             min(
                 max(
-                    pose_difference(X, made.bodies(each.q)[body], length, listed.setting.anatomy.point)
+                    pose_difference(X, made.bodies(each.q)[body], length, listed.setup.decomposition.point)
                     for body, X in mode.bodies.items()
                 )
                 for each in found.modes
@@ -104,7 +104,7 @@ def test_geared_five_bars(ratio: str, seed: int):
         assert mode.proved
         assert mode.radius < 1e-8
         assert mode.configuration is not None
-        assert np.linalg.norm(mode.configuration.twin.residual(mode.configuration.q)) < 1e-9  # its gears too
+        assert np.linalg.norm(mode.configuration.model.residual(mode.configuration.q)) < 1e-9  # its gears too
         R = mode.configuration.pose("floating")[:3, :3] @ found.goal.pose("floating")[:3, :3].T
         assert np.abs(np.exp(1j * np.arctan2(R[1, 0], R[0, 0])) - np.exp(1j * turns)).min() < 1e-8
     real = hrsynth.modes(mechanism, real=True)
@@ -115,7 +115,7 @@ def test_geared_five_bars(ratio: str, seed: int):
 @pytest.mark.parametrize("ratio", [2.0, -1.0])
 def test_a_search_finds_only_closings_that_are_listed(ratio: float):
     listed = hrsynth.modes(five_bar(ratio, 3)[0], "1")
-    found = search(listed.goal, measured(listed).question, leg_ends(listed.setting.anatomy))
+    found = search(listed.goal, measured(listed).observation_model, leg_ends(listed.setup.decomposition))
     assert len(found.modes) > 1
     for mode in found.modes:
         assert (
@@ -151,9 +151,9 @@ def test_a_six_bar_of_two_loops(motor: str, platform: str, count: int, loops: in
     mechanism = linkage(STEPHENSON, LINKS, platform, motor)
     observed = hrsynth.observe(mechanism)
     driven = MeasuredRobot.of_motors(observed)
-    system = planar_loops(driven, observed.everything.start)
+    system = planar_loops(driven, observed.all_samples.start)
     assert len(system.loops) == loops
-    _, found = solve_loops(driven, observed.everything.start)
+    _, found = solve_loops(driven, observed.all_samples.start)
     assert (found.complete, found.complex) == (True, count)
 
 
@@ -165,7 +165,7 @@ def test_loops_are_told_so_that_their_degrees_are_low(word: str, count: int):
     """A tip on a line of the platform, two on circles: 6, as a coupler curve meets a circle; lines alone leave 4."""
     found = hrsynth.modes(mechanism(parse(word)), real=True)
     assert (found.found.complete, found.found.complex) == (True, count)
-    others = search(found.goal, measured(found).question, leg_ends(found.setting.anatomy))
+    others = search(found.goal, measured(found).observation_model, leg_ends(found.setup.decomposition))
     for mode in others.modes:
         assert (
             min(
@@ -193,12 +193,12 @@ def test_slides_that_are_coupled():
 def test_what_has_no_loops_says_why():
     for ratio, reason in ((np.sqrt(2.0), "is not a quotient of whole"), (7.0, "is not a quotient of whole")):
         observed = hrsynth.observe(five_bar(ratio)[0], "1")
-        with pytest.raises(NotConfined, match=reason):
-            planar_loops(MeasuredRobot.of_directions(observed), observed.everything.start)
+        with pytest.raises(UnsupportedLocus, match=reason):
+            planar_loops(MeasuredRobot.of_directions(observed), observed.all_samples.start)
         assert not hrsynth.modes(observed).found.complete
     observed = hrsynth.observe("delta")
-    with pytest.raises(NotConfined, match="not one of a planar mechanism"):
-        planar_loops(MeasuredRobot.of_directions(observed), observed.everything.start)
+    with pytest.raises(UnsupportedLocus, match="not one of a planar mechanism"):
+        planar_loops(MeasuredRobot.of_directions(observed), observed.all_samples.start)
 
 
 def test_what_is_too_large_says_its_size():
@@ -207,7 +207,7 @@ def test_what_is_too_large_says_its_size():
     found = hrsynth.modes("3rrr_m1")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "LARGEST_LOOPS", 5)
-        with pytest.raises(Unsolved, match="2 loops, 4 angles and 0 slides: up to 6 closings, too many"):
+        with pytest.raises(SystemNotSolved, match="2 loops, 4 angles and 0 slides: up to 6 closings, too many"):
             solve_loops(measured(found), found.goal)
 
 
@@ -344,7 +344,7 @@ def test_measurements_of_one_freedom_hold_it_once():
     listed = hrsynth.modes(carried("tool"), see=[f"encoder:{joint}" for joint in "ace"])
     assert listed.found.complete
     assert len(listed.modes) == 2
-    found = search(listed.goal, measured(listed).question, placing_links(listed.setting.anatomy))
+    found = search(listed.goal, measured(listed).observation_model, placing_links(listed.setup.decomposition))
     assert len(found.modes) == 2
     for one in found.modes:
         assert (
@@ -359,8 +359,8 @@ def test_measurements_of_one_freedom_hold_it_once():
 
 @pytest.mark.slow
 def test_a_tool_rests_at_both_its_places():
-    found = hrsynth.endings(carried("tool"), see=[f"encoder:{joint}" for joint in "ace"], at="x=0.35,y=0.9")
-    assert sorted(rest.kind for rest in found.rests if rest.error < 1e-9) == ["goal", "mode"]
+    found = hrsynth.equilibria(carried("tool"), see=[f"encoder:{joint}" for joint in "ace"], at="x=0.35,y=0.9")
+    assert sorted(rest.kind for rest in found.points if rest.error < 1e-9) == ["goal", "mode"]
 
 
 def two_segments() -> Mechanism:
@@ -400,9 +400,11 @@ def two_segments() -> Mechanism:
 def test_two_segments_of_a_leg_are_both_watched(observe: str | None):
     """With each one of them there are two modes, of which the other one's direction excludes the second."""
     found = hrsynth.modes(two_segments(), observe)
-    assert [each.link for each in found.setting.observed] == ["one", "two", "rod"]
+    assert [each.link for each in found.setup.observed] == ["one", "two", "rod"]
     assert (found.found.complete, len(found.modes)) == (True, 1)
-    assert len(search(found.goal, measured(found).question, placing_links(found.setting.anatomy)).modes) == 1
+    assert (
+        len(search(found.goal, measured(found).observation_model, placing_links(found.setup.decomposition)).modes) == 1
+    )
 
 
 @pytest.mark.parametrize("link", ["one", "two"])

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hrsynth.analysis.asked import observe
 from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.modes.branches import solve_all
 from hrsynth.analysis.modes.conditions import (
@@ -22,12 +21,13 @@ from hrsynth.analysis.modes.conditions import (
 )
 from hrsynth.analysis.modes.modes import modes
 from hrsynth.analysis.modes.pose_bound import _Quotient, bound, dimensions
+from hrsynth.analysis.modes.pose_conditions_solver import pose_platform, solve_posed
 from hrsynth.analysis.modes.pose_forms import Poses, SquareForms
-from hrsynth.analysis.modes.posed import pose_platform, solve_posed
 from hrsynth.analysis.modes.search import search
 from hrsynth.analysis.modes.tips import tip_loci
+from hrsynth.analysis.pose_requests import observe
+from hrsynth.catalog.architecture_key import parse
 from hrsynth.catalog.geometry import mechanism
-from hrsynth.catalog.words import parse
 from hrsynth.constraints.pattern import leg_ends
 from hrsynth.geometry.vectors import pose_difference
 from strategies import spherical
@@ -38,11 +38,11 @@ SAME = 1e-6
 
 def measured(word, legs, seed=0):
     """Some legs of a word watched, or its motors (no legs)."""
-    setting = observe(mechanism(parse(word), seed), samples=4)
+    setup = observe(mechanism(parse(word), seed), samples=4)
     if not legs:
-        return MeasuredRobot.of_motors(setting)
-    seen = tuple(o for o in setting.segments if o.leg in legs)
-    return MeasuredRobot.of_directions(replace(setting, observed=seen))
+        return MeasuredRobot.of_motors(setup)
+    seen = tuple(o for o in setup.segments if o.leg in legs)
+    return MeasuredRobot.of_directions(replace(setup, observed=seen))
 
 
 def distance(one, other, length):
@@ -77,14 +77,14 @@ SLOW = [
 )
 def test_what_random_starts_find_is_listed(word, legs, count):
     robot = measured(word, legs)
-    at = robot.setting.configurations[1]
+    at = robot.setup.configurations[1]
     made, found = solve_posed(robot, at)
     assert (found.complex, found.complete) == (count, True)
-    (body,) = leg_ends(robot.setting.anatomy)
+    (body,) = leg_ends(robot.setup.decomposition)
     listed = [made.bodies(mode.q)[body] for mode in found.modes]
-    met = [mode.bodies[body] for mode in search(at, robot.question, (body,)).modes]
-    assert distance(met, listed, at.twin.length) < SAME
-    assert distance([at.pose(body)], listed, at.twin.length) < SAME
+    met = [mode.bodies[body] for mode in search(at, robot.observation_model, (body,)).modes]
+    assert distance(met, listed, at.model.length) < SAME
+    assert distance([at.pose(body)], listed, at.model.length) < SAME
 
 
 @pytest.mark.some(5)
@@ -101,8 +101,8 @@ def test_what_random_starts_find_is_listed(word, legs, count):
 @pytest.mark.parametrize("seed", [0, 1])
 def test_the_known_ways_list_the_same(word, legs, seed):
     robot = measured(word, legs, seed)
-    at = robot.setting.configurations[1]
-    made, known = solve_all(tip_loci(robot.setting.anatomy, robot.question, robot.pattern, at), near=False)
+    at = robot.setup.configurations[1]
+    made, known = solve_all(tip_loci(robot.setup.decomposition, robot.observation_model, robot.pattern, at), near=False)
     other, found = solve_posed(robot, at)
     assert known.complete
     assert found.complete
@@ -110,15 +110,15 @@ def test_the_known_ways_list_the_same(word, legs, seed):
     (body,) = two[0]
     one, two = ([each[body] for each in listed] for listed in (one, two))
     assert (known.complex, len(one)) == (found.complex, len(two))
-    assert max(distance(one, two, at.twin.length), distance(two, one, at.twin.length)) < SAME
+    assert max(distance(one, two, at.model.length), distance(two, one, at.model.length)) < SAME
 
 
 def test_each_pose_is_within_its_radius_of_one_that_fits_all_legs():
     robot = measured(*KINDS[0][:2])
-    at = robot.setting.configurations[1]
+    at = robot.setup.configurations[1]
     (system,) = pose_platform(robot, at)
     made, found = solve_posed(robot, at)
-    (body,) = leg_ends(robot.setting.anatomy)
+    (body,) = leg_ends(robot.setup.decomposition)
     home = np.linalg.inv(at.pose(body))
     for mode in found.modes:
         moved = made.bodies(mode.q)[body] @ home
@@ -232,9 +232,9 @@ def test_three_planes_and_three_spheres_have_forty():
 def test_legs_that_are_not_watched_are_not_forgotten():
     """Three legs that let the platform translate alone, of which the watched one leaves it a freedom: the others, which
     are not watched, take it."""
-    setting = observe(mechanism(parse("2(Rt*-Pl-S)+3(Utn-Pl*-Unt)")), ["1"], samples=4)
-    found = modes(setting)
-    assert found.found.continuum is None
+    setup = observe(mechanism(parse("2(Rt*-Pl-S)+3(Utn-Pl*-Unt)")), ["1"], samples=4)
+    found = modes(setup)
+    assert found.found.continuous_family is None
     assert found.found.complete
     assert (found.found.complex, len(found.modes)) == (2, 2)
     assert found.within == "poses turned as this one"
@@ -247,7 +247,9 @@ def test_a_body_that_turns_about_a_point_has_eight_modes(seed: int):
     elbow's axis, three quadrics of the quaternion."""
     found = modes(spherical(np.random.default_rng(seed)), real=True)
     assert (found.found.complete, found.found.complex) == (True, 8)
-    others = search(found.goal, MeasuredRobot.of_motors(found.setting).question, leg_ends(found.setting.anatomy))
+    others = search(
+        found.goal, MeasuredRobot.of_motors(found.setup).observation_model, leg_ends(found.setup.decomposition)
+    )
     for mode in others.modes:
         assert (
             min(
@@ -267,5 +269,7 @@ def test_a_body_that_turns_about_a_point_has_one_mode_where_its_rods_are_watched
     for seed in range(3):
         found = modes(spherical(np.random.default_rng(seed)), legs)
         assert (found.found.complete, found.found.complex, len(found.modes)) == (True, 1, 1)
-    others = search(found.goal, MeasuredRobot.of_directions(found.setting).question, leg_ends(found.setting.anatomy))
+    others = search(
+        found.goal, MeasuredRobot.of_directions(found.setup).observation_model, leg_ends(found.setup.decomposition)
+    )
     assert len(others.modes) == 1

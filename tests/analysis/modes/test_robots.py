@@ -10,29 +10,29 @@ import numpy as np
 import pytest
 
 from analysis.modes.closings import asked, bodies_of, compared, distance, motor_places
-from hrsynth.analysis.asked import observe as watched
 from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.modes.branches import Model
-from hrsynth.analysis.modes.carried_modes import solve_carried
-from hrsynth.analysis.modes.drift import drift
+from hrsynth.analysis.modes.carrying_leg_modes import solve_carried
+from hrsynth.analysis.modes.goal_error import drift
+from hrsynth.analysis.modes.methods import solve_tips, without_couplings
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.analysis.modes.planar_modes import solve_loops
-from hrsynth.analysis.modes.posed import solve_posed
+from hrsynth.analysis.modes.pose_conditions_solver import solve_posed
 from hrsynth.analysis.modes.single_loop import solve_loop
 from hrsynth.analysis.modes.solve import SystemModes
-from hrsynth.analysis.modes.ways import solve_tips, without_couplings
 from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.analysis.pose_requests import observe as watched
 from hrsynth.budgets import EFFORT
-from hrsynth.description import load, shipped
+from hrsynth.description import list_robots, load
 from hrsynth.errors import (
     BadRequest,
     HrsynthError,
     MissingExtra,
-    NotConfined,
     PoseNotReached,
+    SystemNotSolved,
     TooLarge,
-    Unsolved,
+    UnsupportedLocus,
 )
 from hrsynth.geometry.vectors import Array, inverse, pose, pose_difference
 from hrsynth.kinematics.configuration import ClosedConfiguration
@@ -63,10 +63,10 @@ FEW, MANY = 40, 100
 def listed(name: str, observe: Legs | None, real: bool, sample: int | None = None) -> AssemblyModes | str:
     """The modes at zero, or at the pose of a sample; what is said where there is no list."""
     try:
-        found = modes(load(shipped()[name]), observe, real=real)
+        found = modes(load(list_robots()[name]), observe, real=real)
         if sample is not None and found.model is not None:
-            at = found.setting.motion.pose(found.setting.configurations[sample].pose(found.setting.motion.link))
-            found = modes(load(shipped()[name]), observe, at=at, real=real)
+            at = found.setup.motion.pose(found.setup.configurations[sample].pose(found.setup.motion.link))
+            found = modes(load(list_robots()[name]), observe, at=at, real=real)
     except PoseNotReached as error:
         return str(error)
     return found
@@ -84,14 +84,14 @@ def check_completeness(found: AssemblyModes, starts: int, seed: int = 0) -> froz
 
 def check_modes(found: AssemblyModes) -> None:
     """By screws: each reachable mode is closed and has the goal's measurements; exactly one is the goal."""
-    mechanism = found.setting.mechanism
+    mechanism = found.setup.mechanism
     oracle = Oracle(mechanism)
-    start = state_of(found.goal.twin, found.goal.q)
+    start = state_of(found.goal.model, found.goal.q)
     assert sum(mode.goal for mode in found.modes) == 1
     for mode in found.modes:
-        assert mode.reachable == (not mode.open and not mode.beyond)
+        assert mode.reachable == (not mode.unclosed_legs and not mode.beyond_limits)
         assert mode.reachable or not mode.goal
-        assert (mode.configuration is None) == bool(mode.open)
+        assert (mode.configuration is None) == bool(mode.unclosed_legs)
         if mode.configuration is None:
             continue
         at = mode.configuration
@@ -130,12 +130,12 @@ def test_slides_that_motors_hold_stay_where_they_are(name: str):
 @cache
 def sets_of(name: str) -> list[Legs | None]:
     """All legs, and three of the smallest sets with the best verdict."""
-    return [None, *(tuple(each) for each in legs(load(shipped()[name])).minimal[:3])]
+    return [None, *(tuple(each) for each in legs(load(list_robots()[name])).minimal[:3])]
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("real", [False, True])
-@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("name", list_robots())
 def test_what_closes_is_listed_for_all_robots_and_leg_sets(name: str, real: bool):
     """At a generic pose, and with all legs at the zero configuration, which often is symmetric."""
     for observe in [None] if real else sets_of(name):
@@ -143,9 +143,9 @@ def test_what_closes_is_listed_for_all_robots_and_leg_sets(name: str, real: bool
             found = listed(name, observe, real, sample)
             if isinstance(found, str):
                 assert real, f"{observe}: {found}"
-            elif found.found.continuum:
+            elif found.found.continuous_family:
                 assert found.modes == ()
-                assert f"dimension {found.found.continuum}" in str(found.found.degenerate)
+                assert f"dimension {found.found.continuous_family}" in str(found.found.singular_solutions)
             else:
                 check_modes(found)
                 if found.found.complex is None:
@@ -177,7 +177,7 @@ def check_random(kind: str, seed: int, starts: int) -> str:
     """What became of a random robot: ``listed``, ``continuum`` or ``found``."""
     mechanism, real = robot_of(kind, seed)
     found = modes(mechanism, real=real)
-    if found.found.continuum:
+    if found.found.continuous_family:
         return "continuum"
     check_modes(found)
     if found.found.complex is None:
@@ -213,7 +213,7 @@ def same_modes(one: AssemblyModes, other: AssemblyModes, X: Array | None = None)
         ]
         assert len(twins) == 1
         assert (twins[0].goal, twins[0].reachable) == (mode.goal, mode.reachable)
-        assert len(twins[0].open) == len(mode.open)
+        assert len(twins[0].unclosed_legs) == len(mode.unclosed_legs)
 
 
 @pytest.mark.some(1)
@@ -223,7 +223,7 @@ def test_modes_move_with_the_robot(name: str, observe: Legs | None, real: bool):
     R, p = random_rotation(rng), rng.normal(size=3)
     found = listed(name, observe, real)
     assert not isinstance(found, str), found
-    moved = modes(transformed(load(shipped()[name]), R, p), observe, real=real)
+    moved = modes(transformed(load(list_robots()[name]), R, p), observe, real=real)
     same_modes(found, moved, pose(p, R))
 
 
@@ -233,7 +233,7 @@ def test_the_order_of_legs_and_links_does_not_matter(name: str, observe: Legs | 
     """Legs are named by their links here: their labels follow the order."""
     found = listed(name, observe, False)
     assert not isinstance(found, str), found
-    mechanism = load(shipped()[name])
+    mechanism = load(list_robots()[name])
     same_modes(found, modes(mechanism, (observe or ("3", "1", "2"))[::-1]))
     same_modes(found, modes(reordered(mechanism, np.random.default_rng(2)), observe))
 
@@ -250,7 +250,7 @@ def test_from_another_mode_the_list_is_the_same(name: str, observe: Legs | None)
         if mode.goal or not mode.reachable:
             continue
         try:
-            other = modes(found.setting.robot, observe, at=mode.pose)
+            other = modes(found.setup.robot, observe, at=mode.pose)
         except HrsynthError:
             continue
         if np.abs(asked_directions(other) - asked_directions(found)).max() < 1e-9:
@@ -258,16 +258,16 @@ def test_from_another_mode_the_list_is_the_same(name: str, observe: Legs | None)
             assert len(other.modes) == len(found.modes)
             for each in found.modes:
                 assert any(
-                    all(np.abs(X - twin.bodies[body]).max() < 1e-6 for body, X in each.bodies.items())
-                    for twin in other.modes
+                    all(np.abs(X - model.bodies[body]).max() < 1e-6 for body, X in each.bodies.items())
+                    for model in other.modes
                 )
     assert reached or len(found.modes) == 1
 
 
 def asked_directions(found: AssemblyModes) -> Array:
     """The goal's directions by screws (k, 3)."""
-    oracle = Oracle(found.setting.mechanism)
-    return oracle.directions(state_of(found.goal.twin, found.goal.q), asked(found).observations)
+    oracle = Oracle(found.setup.mechanism)
+    return oracle.directions(state_of(found.goal.model, found.goal.q), asked(found).observations)
 
 
 @pytest.mark.some(1)
@@ -286,9 +286,9 @@ def asked_directions(found: AssemblyModes) -> Array:
 def test_a_pose_that_is_left_undetermined_is_a_continuum(name: str, observe: Legs | None, size: int):
     found = listed(name, observe, False)
     assert not isinstance(found, str), found
-    assert (found.found.continuum, found.modes, found.near, found.found.complete) == (size, (), (), False)
-    assert f"dimension {size}" in str(found.found.degenerate)
-    assert found.to_dict()["continuum"] == size
+    assert (found.found.continuous_family, found.modes, found.near_modes, found.found.complete) == (size, (), (), False)
+    assert f"dimension {size}" in str(found.found.singular_solutions)
+    assert found.to_dict()["continuous_family"] == size
 
 
 @pytest.mark.parametrize(
@@ -304,7 +304,7 @@ def test_a_pose_that_is_left_undetermined_is_a_continuum(name: str, observe: Leg
 )
 def test_what_is_asked_wrongly_is_refused_in_one_line(arguments):
     with pytest.raises(BadRequest) as caught:
-        modes(load(shipped()["quattro"]), **arguments)
+        modes(load(list_robots()["quattro"]), **arguments)
     assert "\n" not in str(caught.value)
 
 
@@ -353,7 +353,7 @@ def test_a_four_bar_has_two_modes_with_one_link_watched_and_one_with_both(seed: 
 )
 def test_couplings_in_space_rule_poses_out(name: str, one: str, other: str, ratio: float, real: bool):
     """Lists are those of the robot without them, with the tied motor held; closings with them are among these."""
-    robot = load(shipped()[name])
+    robot = load(list_robots()[name])
     ends = [robot.joints[joint] for joint in (one, other)]
     coupled = robot.changed(
         joints=[replace(ends[1], motor=None)],
@@ -370,10 +370,14 @@ def test_couplings_in_space_rule_poses_out(name: str, one: str, other: str, rati
             assert distance(free, of_free, mode.configuration) < 1e-9
             places = [moved_since_zero(found, mode.configuration, joint) for joint in ends]
             assert places[1] == pytest.approx(ratio * places[0], abs=1e-8)
-        elif of_free.configuration is not None and mode.gears:
+        elif of_free.configuration is not None and mode.open_couplings:
             places = [moved_since_zero(free, of_free.configuration, joint) for joint in ends]
             assert abs(places[1] - ratio * places[0]) > 1e-6
-            assert (mode.open, mode.gears, mode.to_dict()["open_couplings"]) == ((), ("gear",), ["gear"])
+            assert (mode.unclosed_legs, mode.open_couplings, mode.to_dict()["open_couplings"]) == (
+                (),
+                ("gear",),
+                ["gear"],
+            )
             assert "only with coupling gear left open" in text(found)
         if real:
             assert mode.assembly == of_free.assembly
@@ -381,17 +385,17 @@ def test_couplings_in_space_rule_poses_out(name: str, one: str, other: str, rati
 
 def test_a_coupling_that_is_left_open_is_named():
     """Legs that close where a coupling does not are no legs that are left open."""
-    robot = load(shipped()["3rps"])
+    robot = load(list_robots()["3rps"])
     ends = [robot.joints[joint] for joint in ("slide_2", "slide_1")]
     coupled = robot.changed(
         joints=[replace(ends[1], motor=None)], couplings=(Coupling("gear", ends[0].successor, ends[1].successor, 1.0),)
     )
     found, free = modes(coupled), modes(robot)
-    assert any(mode.gears for mode in found.modes)
+    assert any(mode.open_couplings for mode in found.modes)
     for mode, of_free in zip(found.modes, free.modes, strict=True):
         places = [moved_since_zero(free, of_free.configuration, joint) for joint in ends]
-        assert (mode.gears == ("gear",)) is (abs(places[1] - places[0]) > 1e-6)
-        assert mode.open == ()
+        assert (mode.open_couplings == ("gear",)) is (abs(places[1] - places[0]) > 1e-6)
+        assert mode.unclosed_legs == ()
 
 
 def test_there_is_no_matrix_at_a_stretched_leg():
@@ -424,7 +428,7 @@ def test_there_is_no_matrix_at_a_stretched_leg():
 
 def test_a_joint_that_a_coupling_holds_apart_from_another_is_no_joint_without_it():
     """Two stages of a telescope, both driven: the link between them is there for the coupling alone."""
-    robot = load(shipped()["3rps"])
+    robot = load(list_robots()["3rps"])
     slide, stage = robot.joints["slide_1"], "stage"
     inner = replace(slide, name="inner", predecessor=stage)
     coupled = robot.changed(
@@ -432,16 +436,16 @@ def test_a_joint_that_a_coupling_holds_apart_from_another_is_no_joint_without_it
         joints=[replace(slide, successor=stage), inner],
         couplings=(Coupling("belt", stage, slide.successor, 1.0),),
     )
-    setting = watched(coupled)
-    assert stage in setting.mechanism.links
-    assert without_couplings(MeasuredRobot.of_motors(setting), setting.everything.start) is None
-    assert without_couplings(MeasuredRobot.of_directions(setting), setting.everything.start) is not None
+    setup = watched(coupled)
+    assert stage in setup.mechanism.links
+    assert without_couplings(MeasuredRobot.of_motors(setup), setup.all_samples.start) is None
+    assert without_couplings(MeasuredRobot.of_directions(setup), setup.all_samples.start) is not None
 
 
 def moved_since_zero(found: AssemblyModes, at: ClosedConfiguration, joint: Joint) -> float:
     """The turn (rad) or the slide (m) of a joint of one freedom since the zero configuration of the robot (a mode's own
     twin has its zero at the mode), from the poses of its links."""
-    links = found.setting.everything.start.twin.mechanism.links
+    links = found.setup.all_samples.start.model.mechanism.links
     before, after = (at.pose(link) @ inverse(links[link].pose) for link in joint.links)
     D, axis = inverse(before) @ after, joint.axes[0]
     if joint.type is JointType.PRISMATIC:
@@ -460,21 +464,21 @@ WAYS = {
 
 
 @pytest.mark.some(1, 5)
-@pytest.mark.parametrize("name", sorted(shipped()))
+@pytest.mark.parametrize("name", sorted(list_robots()))
 def test_all_ways_list_the_same(name: str):
     """The known patterns and the general ways, wherever several of them prove a list: the same poses, and as many
     complex ones (a carried platform with more conditions than needed counts those that all of them meet)."""
-    robot = load(shipped()[name])
+    robot = load(list_robots()[name])
     sets = [*dict.fromkeys([None, *legs(robot).minimal[:2]]), "motors"]
     for observe in sets:
-        setting = ObservedRobot.of(robot, None if observe == "motors" else observe)
-        measured = MeasuredRobot.of_motors(setting) if observe == "motors" else MeasuredRobot.of_directions(setting)
-        if measured.rank < setting.dof:
+        setup = ObservedRobot.of(robot, None if observe == "motors" else observe)
+        measured = MeasuredRobot.of_motors(setup) if observe == "motors" else MeasuredRobot.of_directions(setup)
+        if measured.rank < setup.dof:
             continue
-        goal = setting.everything.start
-        exact, listed = drift(goal, None, setting.normal.moved), dict[str, tuple[Model, SystemModes]]()
+        goal = setup.all_samples.start
+        exact, listed = drift(goal, None, setup.normal.moved), dict[str, tuple[Model, SystemModes]]()
         for way, solved in WAYS.items():
-            with suppress(NotConfined, Unsolved, TooLarge, MissingExtra):
+            with suppress(UnsupportedLocus, SystemNotSolved, TooLarge, MissingExtra):
                 made, found = solved(measured, goal, exact)
                 if found.complete:
                     listed[way] = made, found
@@ -489,7 +493,7 @@ def test_all_ways_list_the_same(name: str):
                 assert (
                     min(
                         max(
-                            pose_difference(X, first.bodies(each.q)[body], goal.twin.length)
+                            pose_difference(X, first.bodies(each.q)[body], goal.model.length)
                             for body, X in bodies.items()
                         )
                         for each in one.modes

@@ -15,10 +15,10 @@ from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.modes.modes import AssemblyModes
 from hrsynth.analysis.modes.msolve import PACKAGE
 from hrsynth.analysis.modes.search import search
+from hrsynth.catalog.architecture_key import parse
 from hrsynth.catalog.entry import mechanism
-from hrsynth.catalog.words import parse
 from hrsynth.constraints.pattern import leg_ends
-from hrsynth.description import load, shipped
+from hrsynth.description import list_robots, load
 from hrsynth.mechanism import Mechanism
 
 LISTED = [
@@ -34,15 +34,15 @@ WORDS = ["(Pk*-Rt-S)+(Rt*-Rt-S)+(S-Rt*-Rt)", "3(Ra!-Ra*-Ph-Rb-Ra)", "3(Ph*-Rz-Pi
 
 @cache
 def robot(name: str) -> Mechanism:
-    return load(shipped()[name]) if name in shipped() else mechanism(parse(name), 0)
+    return load(list_robots()[name]) if name in list_robots() else mechanism(parse(name), 0)
 
 
 def check_agreement(listed: AssemblyModes) -> None:
     """What is searched for is in the complete list, but for closings on another branch (crossed parallelograms, turns
     of a platform that only translates)."""
     assert listed.found.complete
-    measured = (MeasuredRobot.of_motors if listed.kind == "real" else MeasuredRobot.of_directions)(listed.setting)
-    found = search(listed.goal, measured.question, leg_ends(listed.setting.anatomy))
+    measured = (MeasuredRobot.of_motors if listed.kind == "real" else MeasuredRobot.of_directions)(listed.setup)
+    found = search(listed.goal, measured.observation_model, leg_ends(listed.setup.decomposition))
     assert found.loose == 0
     for mode in found.modes:
         if not other_branch(listed, mode.configuration):
@@ -69,7 +69,7 @@ def test_a_search_finds_only_what_a_complete_list_has(name: str, observe: str | 
 def test_a_search_finds_only_what_a_complete_list_of_a_random_robot_has(kind: str, seed: int):
     mechanism, real = robot_of(kind, seed)
     listed = hrsynth.modes(mechanism, real=real)
-    if listed.found.complete and listed.found.continuum is None:
+    if listed.found.complete and listed.found.continuous_family is None:
         check_agreement(listed)
 
 
@@ -90,9 +90,9 @@ def test_a_platform_that_is_a_point_has_modes_at_points():
     """However its body, of which only the point counts, is turned."""
     mechanism, real = robot_of("planar, a point", 6)
     listed = hrsynth.modes(mechanism, real=real)
-    measured = (MeasuredRobot.of_motors if real else MeasuredRobot.of_directions)(listed.setting)
-    bodies = leg_ends(listed.setting.anatomy)
-    found = search(listed.goal, measured.question, bodies)
+    measured = (MeasuredRobot.of_motors if real else MeasuredRobot.of_directions)(listed.setup)
+    bodies = leg_ends(listed.setup.decomposition)
+    found = search(listed.goal, measured.observation_model, bodies)
     assert listed.found.complete
     assert len(found.modes) == len(listed.modes) == 2
 
@@ -101,10 +101,10 @@ def test_a_platform_that_is_a_point_has_modes_at_points():
 def test_poses_that_the_measurements_leave_free_are_told_and_not_listed():
     """Watched legs that see all freedoms at a generic pose, at a zero pose where they do not: it moves in two ways."""
     found = hrsynth.modes(robot("3(Ra-Rb*-Ph-Rb-Pj)"))
-    (motion,) = found.motions
-    assert (motion.goal, motion.dimension, found.found.continuum) == (True, 2, 2)
+    (motion,) = found.self_motions
+    assert (motion.goal, motion.dimension, found.found.continuous_family) == (True, 2, 2)
     assert "platform" in motion.links
-    assert not {o.link for o in found.setting.observed} & set(motion.links)
+    assert not {o.link for o in found.setup.observed} & set(motion.links)
     assert found.modes == ()
 
 

@@ -17,13 +17,13 @@ from analysis.modes.counted import count
 from analysis.modes.test_posed import distance
 from analysis.modes.watched import free_body, watched, written
 from analysis.test_sensors import arm
-from hrsynth.analysis.asked import observe
 from hrsynth.analysis.measured import MeasuredRobot
-from hrsynth.analysis.modes.leg_conditions import Middle
+from hrsynth.analysis.modes.leg_conditions import OriginAndUnit
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
+from hrsynth.analysis.modes.observation_loci import PlatformObservation, conditions
 from hrsynth.analysis.modes.search import search
-from hrsynth.analysis.modes.sighted import Sight, conditions
 from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.analysis.pose_requests import observe
 from hrsynth.constraints.pattern import leg_ends
 from hrsynth.errors import BadRequest, NoCertificate
 from hrsynth.geometry.vectors import Array
@@ -88,9 +88,9 @@ def test_what_a_held_value_leaves_is_what_it_transmits(kind: type, back: bool) -
         seen, X_c, X = far(np.random.default_rng(seed), kind)
         at = seen.sighting(X_c, X)  # type: ignore[attr-defined]
         wrenches = np.array(seen.wrenches(at), dtype=float)  # type: ignore[attr-defined]
-        sight = Sight(seen, "l", seen.loci(at), back)  # type: ignore[attr-defined]
+        sight = PlatformObservation(seen, "l", seen.loci(at), back)  # type: ignore[attr-defined]
         for turned in (False, True):
-            found = conditions([sight], Middle(np.zeros(3), 1.0), turned)
+            found = conditions([sight], OriginAndUnit(np.zeros(3), 1.0), turned)
             assert max(abs(float(c.value(c.b, c.c, np.asarray))) for c in found) < 1e-9
             rates = np.array([c.rates for c in found])
             ranks = [np.linalg.matrix_rank(each, tol=1e-7) for each in (wrenches, rates, np.vstack([wrenches, rates]))]
@@ -192,36 +192,34 @@ QUICKLY = ("a plane",)
     "name", [pytest.param(name, marks=() if name in QUICKLY else pytest.mark.slow) for name in ROBOTS]
 )
 def test_what_random_starts_of_the_whole_robot_find_is_listed(name: str) -> None:
-    setting: ObservedRobot = ROBOTS[name]()
-    found = modes(setting, at=setting.configurations[0])
+    setup: ObservedRobot = ROBOTS[name]()
+    found = modes(setup, at=setup.configurations[0])
     assert found.found.complete
-    bodies = leg_ends(setting.anatomy)
-    met = [mode.bodies[bodies[0]] for mode in search(found.goal, setting.samples.question, bodies).modes]
+    bodies = leg_ends(setup.decomposition)
+    met = [mode.bodies[bodies[0]] for mode in search(found.goal, setup.samples.observation_model, bodies).modes]
     if found.within == "poses turned as this one":  # others are not looked for, and a search meets them
         met = [X for X in met if np.abs(X[:3, :3] - found.goal.pose(bodies[0])[:3, :3]).max() < SAME]
     listed = [mode.bodies[bodies[0]] for mode in found.modes if mode.bodies is not None]
-    assert distance(met, listed, found.goal.twin.length) < SAME
+    assert distance(met, listed, found.goal.model.length) < SAME
     for mode in found.modes:
         if mode.configuration is not None:
             values = [
                 o.value(
-                    mode.configuration.pose(o.seen_from or setting.mechanism.reference), mode.configuration.pose(o.link)
+                    mode.configuration.pose(o.seen_from or setup.mechanism.reference), mode.configuration.pose(o.link)
                 )
-                for o in setting.observed
+                for o in setup.observed
             ]
             held = [
-                o.value(found.goal.pose(o.seen_from or setting.mechanism.reference), found.goal.pose(o.link))
-                for o in setting.observed
+                o.value(found.goal.pose(o.seen_from or setup.mechanism.reference), found.goal.pose(o.link))
+                for o in setup.observed
             ]
             assert max(np.abs(a - b).max() for a, b in zip(values, held, strict=True)) < SAME
 
 
 def test_a_leg_that_restricts_turns_counts_too() -> None:
     """A 3-RPS moves with three freedoms; its legs' planes are conditions beside what is seen."""
-    setting = observe(
-        "3rps", camera="eye=base@0.3,0.1,0", see=["point:platform@0.1,0,0", "distance:platform@-0.1,0.1,0"]
-    )
-    found = modes(setting, at=setting.configurations[0])
+    setup = observe("3rps", camera="eye=base@0.3,0.1,0", see=["point:platform@0.1,0,0", "distance:platform@-0.1,0.1,0"])
+    found = modes(setup, at=setup.configurations[0])
     assert (found.found.complex, found.found.complete) == (16, True)
 
 
@@ -294,7 +292,9 @@ def test_encoders_of_legs_are_held_with_the_legs() -> None:
     assert (found.found.complex, found.found.complete) == (4, True)  # circles about one centre: two shapes, two turns
     other = modes("rrrrr_m1", camera="eye=base@0.3,0.1,0.5", see="point:dist_1@0.1,0,0")
     assert (other.found.complete, len(other.modes)) == (True, 2)
-    found = search(other.goal, MeasuredRobot.of_directions(other.setting).question, leg_ends(other.setting.anatomy))
+    found = search(
+        other.goal, MeasuredRobot.of_directions(other.setup).observation_model, leg_ends(other.setup.decomposition)
+    )
     assert len(found.modes) == 2
 
 

@@ -15,11 +15,11 @@ from analysis.modes.draws import Draw, dietmaier, six_rods, spatial
 from analysis.modes.laws import among
 from analysis.modes.test_meant import CLASSES
 from hrsynth.analysis.modes.bounds import degree_bound, least_bound
-from hrsynth.analysis.modes.curves import Circle, Plane, Point, Sphere
 from hrsynth.analysis.modes.homotopy import section
+from hrsynth.analysis.modes.loci import Circle, Plane, Point, Sphere
 from hrsynth.analysis.modes.rigid import Spatial
 from hrsynth.analysis.modes.solve import SystemModes, solve
-from hrsynth.description import load, shipped
+from hrsynth.description import list_robots, load
 from hrsynth.geometry.vectors import pose, rotation_about, unit
 from strategies import random_rotation
 
@@ -128,7 +128,7 @@ def test_they_move_with_the_base_whose_legs_are_counted_in_any_order():
 
 def test_the_shipped_platform_has_twenty_eight():
     """Base and platform are symmetric hexagons: twelve solutions lie at infinity, and are enclosed there."""
-    found = hrsynth.modes(load(shipped()["gough_stewart"]), real=True).found
+    found = hrsynth.modes(load(list_robots()["gough_stewart"]), real=True).found
     assert (found.complex, found.complete) == (28, True)
     assert "12 enclosed at infinity" in found.proof
 
@@ -140,7 +140,7 @@ def test_platforms_that_move_are_not_listed(word: str):
     system, _ = six_rods(np.random.default_rng(0), word, "ABCDEF" if word == "AAABBB" else "ABABAB")
     found = solve(system)
     assert (found.complete, found.modes) == (False, ())
-    assert found.continuum == 1
+    assert found.continuous_family == 1
 
 
 @pytest.mark.slow
@@ -247,7 +247,7 @@ def test_three_angles_leave_no_continuum():
     """They decide the turn, three spheres the place: 16 poses, and infinitely many solutions at infinity."""
     system, goal = with_angles(np.random.default_rng(0), "SSS", 3)
     found = solve(system, near=False)
-    assert (found.complex, found.complete, found.continuum) == (16, False, None)
+    assert (found.complex, found.complete, found.continuous_family) == (16, False, None)
     assert among(goal, found) < 1e-9
 
 

@@ -13,16 +13,16 @@ import pytest
 
 from analysis.modes.draws import FAMILIES, MEETING, SURFACES, on_two_bodies, spatial, translating
 from analysis.modes.laws import among, check_agreement, check_member, draw, needs_msolve
-from hrsynth.analysis.modes.curves import Circle, Plane, Reach, Sphere
+from hrsynth.analysis.modes.constrained_platform import System
+from hrsynth.analysis.modes.loci import Circle, Plane, Reach, Sphere
 from hrsynth.analysis.modes.msolve import parametrise, read, write_system
 from hrsynth.analysis.modes.polynomials import Quadric
+from hrsynth.analysis.modes.pose_coordinate_solver import wholes
 from hrsynth.analysis.modes.quadrics import Balls
 from hrsynth.analysis.modes.rigid import Planar
 from hrsynth.analysis.modes.solve import solve, solve_by_msolve
-from hrsynth.analysis.modes.systems import System
 from hrsynth.analysis.modes.translating import Articulated, Translating
-from hrsynth.analysis.modes.wholes import wholes
-from hrsynth.errors import BadRequest, MissingExtra, Unsolved
+from hrsynth.errors import BadRequest, MissingExtra, SystemNotSolved
 from hrsynth.geometry.vectors import rotation_about, unit
 from strategies import random_rotation
 
@@ -115,7 +115,7 @@ def test_three_spheres_that_do_not_meet_have_no_real_place():
 def test_three_spheres_that_touch_are_singular():
     spheres = tuple(Sphere(2.0 * np.array(e), 2.0) for e in ((1, 0, 0), (-0.6, 0.8, 0), (0, -1, 0)))
     modes = solve(Translating(spheres, np.zeros((3, 3))))
-    assert "singular" in str(modes.degenerate)
+    assert "singular" in str(modes.singular_solutions)
     assert among(np.eye(4), modes) < 1e-6
 
 
@@ -132,7 +132,7 @@ def test_a_continuum_of_places_is_said(kind: str):
     }
     curves, dimension = reaches[kind]
     modes = solve(Translating(tuple(curves), np.zeros((3, 3))))
-    assert (modes.continuum, modes.complete, modes.modes) == (dimension, False, ())
+    assert (modes.continuous_family, modes.complete, modes.modes) == (dimension, False, ())
 
 
 @pytest.mark.parametrize("name", ["three spheres", "a sphere and two planes"])
@@ -215,7 +215,7 @@ def test_msolve_is_asked_and_read_in_its_own_words():
 @needs_msolve
 def test_msolve_stops_in_time():
     part = next(wholes(spatial(np.random.default_rng(0), "SSSSSS").system))
-    with pytest.raises(Unsolved, match="no answer within"):
+    with pytest.raises(SystemNotSolved, match="no answer within"):
         parametrise(part.equations(), timeout=0.05)
 
 
@@ -235,10 +235,10 @@ def test_without_msolve_the_extra_is_named(monkeypatch):
 
 def test_too_few_surfaces_leave_a_continuum():
     rng = np.random.default_rng(0)
-    assert solve(spatial(rng, "SSSS").system).continuum == 2
-    assert solve(translating(rng, "SE").system).continuum == 1
-    assert solve(on_two_bodies(rng, ("SSSS", "")).system).continuum == 1
-    assert solve_by_msolve(spatial(rng, "LL").system).continuum == 2
+    assert solve(spatial(rng, "SSSS").system).continuous_family == 2
+    assert solve(translating(rng, "SE").system).continuous_family == 1
+    assert solve(on_two_bodies(rng, ("SSSS", "")).system).continuous_family == 1
+    assert solve_by_msolve(spatial(rng, "LL").system).continuous_family == 2
 
 
 @pytest.mark.parametrize(

@@ -7,14 +7,14 @@ import pytest
 
 from analysis.modes.laws import needs_msolve
 from hrsynth.analysis.modes.branches import model
-from hrsynth.analysis.modes.curves import Circle, Line, Plane, Point, Sphere
+from hrsynth.analysis.modes.loci import Circle, Line, Plane, Point, Sphere
 from hrsynth.analysis.modes.solve import solve
 from hrsynth.analysis.modes.tips import tip_loci
 from hrsynth.analysis.observed import ObservedRobot, motors
 from hrsynth.constraints.pattern import recognise
-from hrsynth.description import load, shipped
-from hrsynth.errors import NotConfined
-from hrsynth.kinematics.locked import joint_at
+from hrsynth.description import list_robots, load
+from hrsynth.errors import UnsupportedLocus
+from hrsynth.kinematics.locked_twists import joint_at
 from hrsynth.mechanism.legs import decompose
 
 HIDDEN = {
@@ -54,18 +54,18 @@ RODS = (
 
 
 def confined(name: str, *, real: bool = False, member: int = 1):
-    setting = ObservedRobot.of(load(shipped()[name]))
-    question = motors(setting) if real else setting.samples.question
-    configurations = [each.configuration for each in setting.samples.members]
-    pattern = recognise(setting.anatomy, question, configurations)
-    return tip_loci(setting.anatomy, question, pattern, configurations[member])
+    setup = ObservedRobot.of(load(list_robots()[name]))
+    observation_model = motors(setup) if real else setup.samples.observation_model
+    configurations = [each.configuration for each in setup.samples.members]
+    pattern = recognise(setup.decomposition, observation_model, configurations)
+    return tip_loci(setup.decomposition, observation_model, pattern, configurations[member])
 
 
 def missed(found) -> float:
     """How far the tips are from their curves at the goal, in characteristic lengths."""
     poses = {body: found.goal.pose(body) for body in found.bodies}
     points = [(tip, poses[tip.body] @ np.append(tip.place, 1.0)) for tip in found.tips]
-    return max(float(np.linalg.norm(tip.curve.miss(B[:3]))) for tip, B in points) / found.goal.twin.length
+    return max(float(np.linalg.norm(tip.curve.miss(B[:3]))) for tip, B in points) / found.goal.model.length
 
 
 @pytest.mark.some(2)
@@ -87,7 +87,7 @@ def test_tips_with_the_motors_held(name: str):
 def test_circles_have_the_length_of_the_cranks():
     """The tip of a held crank and rod moves on a circle with the crank's radius."""
     found = confined("3rrr_m1")
-    joints = found.goal.twin.mechanism.joints
+    joints = found.goal.model.mechanism.joints
     for tip in found.tips:
         crank = np.linalg.norm(joints[f"elbow_{tip.leg}"].point - joints[f"shoulder_{tip.leg}"].point)
         assert tip.curve.radius == pytest.approx(crank, abs=1e-9)
@@ -96,11 +96,11 @@ def test_circles_have_the_length_of_the_cranks():
 def test_spheres_have_the_length_of_the_rods():
     """With its motor held the tip of a leg U-P-S keeps its distance from the U."""
     found = confined("gough_stewart", real=True)
-    ends = {leg.label: leg.joints for leg in decompose(found.goal.twin.mechanism).legs}
+    ends = {leg.label: leg.joints for leg in decompose(found.goal.model.mechanism).legs}
     poses = {body: found.goal.pose(body) for body in found.bodies}
     for tip in found.tips:
-        centres = [joint_at(found.goal, found.goal.twin.mechanism.joints[name])[0] for name in ends[tip.leg]]
-        rod = max(np.linalg.norm(a - b) for a in centres for b in centres) * found.goal.twin.length
+        centres = [joint_at(found.goal, found.goal.model.mechanism.joints[name])[0] for name in ends[tip.leg]]
+        rod = max(np.linalg.norm(a - b) for a in centres for b in centres) * found.goal.model.length
         assert tip.curve.radius == pytest.approx(rod, abs=1e-9)
         end = (poses[tip.body] @ np.append(tip.place, 1.0))[:3]
         assert np.linalg.norm(end - tip.curve.centre) == pytest.approx(rod)
@@ -115,7 +115,7 @@ def test_tips_that_two_slides_carry_stay_in_a_plane(name: str):
 
 @pytest.mark.parametrize(("name", "real"), [("3ppr_m1", False), ("3prp", True)])
 def test_tips_without_a_place_are_refused(name: str, real: bool):
-    with pytest.raises(NotConfined, match="cannot be listed"):
+    with pytest.raises(UnsupportedLocus, match="cannot be listed"):
         confined(name, real=real)
 
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hrsynth.analysis.asked import observe
 from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.analysis.pose_requests import observe
 from hrsynth.geometry.vectors import Array
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Mechanism

@@ -14,15 +14,15 @@ from hypothesis import strategies as st
 import strategies
 from analysis.singularity.found import found
 from analysis.singularity.test_conditions import CASES, HEAVY
-from hrsynth.analysis.singularity.agreement import Agreement, agreement, weakest
+from hrsynth.analysis.singularity.condition_check import Agreement, agreement, weakest
 from hrsynth.analysis.singularity.rank_descent import lose
-from hrsynth.analysis.singularity.singular import Singularity, singular
+from hrsynth.analysis.singularity.singularities import Singularity, singularities
+from hrsynth.catalog.architecture_key import parse
 from hrsynth.catalog.geometry import mechanism
-from hrsynth.catalog.words import parse
 from hrsynth.constraints.condition import Condition, condition
 from hrsynth.constraints.locked_legs import LockedLeg
 from hrsynth.constraints.pattern import ConstraintPattern, PatternValues
-from hrsynth.description import load, shipped
+from hrsynth.description import list_robots, load
 from hrsynth.errors import BadRequest, Disagreement
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.walking import random_walk
@@ -47,7 +47,7 @@ def check(answer: Singularity, points: int) -> None:
         assert checked.on_locus == ()
     for each in answer.examples:
         assert each.sigma < RANK_CUTOFF < each.nearby
-        assert each.lost
+        assert each.unobserved
 
 
 @pytest.mark.some(1, 8)
@@ -63,21 +63,21 @@ def test_shipped_robots(robot: str, legs: str | None, real: bool) -> None:
 
 
 @pytest.mark.some(0, 3)
-@pytest.mark.parametrize("robot", shipped())
+@pytest.mark.parametrize("robot", list_robots())
 def test_shipped_robots_at_ten_thousand_poses(robot: str) -> None:
-    check(singular(load(robot)), 10_000)
+    check(singularities(load(robot)), 10_000)
 
 
 @pytest.mark.some(0, 4)
-@pytest.mark.parametrize("robot", shipped())
+@pytest.mark.parametrize("robot", list_robots())
 def test_shipped_robots_with_their_own_motors(robot: str) -> None:
-    check(singular(load(robot), real=True, points=1000), 1000)
+    check(singularities(load(robot), real=True, points=1000), 1000)
 
 
 @pytest.mark.slow
 def test_a_zero_of_the_expression_where_the_platform_has_fewer_freedoms_is_no_disagreement() -> None:
     """det(p1, p2, p3) also vanishes where the platform itself has two freedoms: nothing is lost to the motors there."""
-    check(singular(load("3upu"), real=True, points=40), 40)
+    check(singularities(load("3upu"), real=True, points=40), 40)
 
 
 @pytest.mark.some(2)
@@ -93,7 +93,7 @@ def test_a_zero_of_the_expression_where_the_platform_has_fewer_freedoms_is_no_di
     ],
 )
 def test_a_condition_whose_sign_changes_has_poses_on_its_locus(robot: str, legs: str | None, real: bool) -> None:
-    answer = singular(load(robot), legs, real=real, points=500)
+    answer = singularities(load(robot), legs, real=real, points=500)
     assert answer.condition.signed
     assert min(answer.checked.sides) > 0
     assert len(answer.examples) > 0
@@ -119,11 +119,11 @@ def test_many_random_robots(robot: Mechanism, seed: int, real: bool) -> None:
 
 def check_random_robot(robot: Mechanism, seed: int, real: bool, points: int) -> None:
     """Words, expression and rank agree, and turning the whole robot changes neither words nor expression."""
-    one = singular(robot, real=real, points=points)
+    one = singularities(robot, real=real, points=points)
     check(one, points)
     rng = np.random.default_rng(seed)
     turned = strategies.transformed(robot, strategies.random_rotation(rng), rng.normal(size=3))
-    two = singular(turned, real=real, points=points)
+    two = singularities(turned, real=real, points=points)
     check(two, points)
     assert one.pattern.motion == two.pattern.motion
     assert one.to_dict()["expression"] == two.to_dict()["expression"]
@@ -135,7 +135,7 @@ def check_random_robot(robot: Mechanism, seed: int, real: bool, points: int) -> 
 
 
 def again(answer: Singularity, pattern: ConstraintPattern, wrong: Condition, points: int = 60) -> Agreement:
-    return agreement(answer.setting.samples.start, answer.question, pattern, wrong, points)
+    return agreement(answer.setup.samples.start, answer.observation_model, pattern, wrong, points)
 
 
 def with_leg(pattern: ConstraintPattern, leg: LockedLeg) -> ConstraintPattern:
@@ -160,9 +160,9 @@ def test_another_tip_is_told(robot: Sequence[str]) -> None:
     answer = found(*robot)
     wrong = with_leg(answer.pattern, elsewhere(answer))
     with pytest.raises(Disagreement) as caught:
-        again(answer, wrong, condition(wrong, answer.question))
+        again(answer, wrong, condition(wrong, answer.observation_model))
     assert caught.value.angle > 1e-3
-    assert answer.setting.mechanism.name in str(caught.value)
+    assert answer.setup.mechanism.name in str(caught.value)
 
 
 @pytest.mark.some(2)
@@ -173,7 +173,7 @@ def test_another_line_is_told(robot: Sequence[str]) -> None:
     answer = found(*robot)
     wrong = with_leg(answer.pattern, of_another(answer))
     with pytest.raises(Disagreement) as caught:
-        again(answer, wrong, condition(wrong, answer.question))
+        again(answer, wrong, condition(wrong, answer.observation_model))
     assert caught.value.angle > 1e-3
 
 
@@ -231,23 +231,23 @@ def test_a_false_never_is_told_though_no_pose_that_was_drawn_is_singular(
 def test_where_the_rank_is_led_to_zero_the_expression_vanishes(robot: str, legs: str | None, real: bool) -> None:
     """The descent knows the relation alone, the expression names alone."""
     answer = found(robot, legs, real=real)
-    start = answer.setting.samples.start
+    start = answer.setup.samples.start
     ends = [
         at
         for drawn in random_walk(start, 40, 3, steps=8)
-        if (at := lose(drawn, answer.question)) is not None
+        if (at := lose(drawn, answer.observation_model)) is not None
         and at.kernel()[1].weakest > 0.05 * start.kernel()[1].weakest
     ]
     assert len(ends) > 4
     for at in ends:
-        assert weakest(at, answer.question) < RANK_CUTOFF
+        assert weakest(at, answer.observation_model) < RANK_CUTOFF
         assert abs(answer.condition.evaluate(answer.pattern.values_at([at]))[0]) < 1e-6
 
 
 @pytest.mark.slow
 def test_the_rank_is_not_led_into_another_operation_mode() -> None:
     """Steps that closed the loops anew led this platform from translations to turns, in which it loses one."""
-    answer = singular(mechanism(parse("3(Ra!-Rb*-Rb-Ra-Ra)"), 0), real=True, points=60)
+    answer = singularities(mechanism(parse("3(Ra!-Rb*-Rb-Ra-Ra)"), 0), real=True, points=60)
     assert answer.condition.never
     assert answer.checked.disagreements == 0
 
@@ -261,4 +261,4 @@ def test_a_robot_without_motors_has_no_real_condition() -> None:
     robot = load("3rrr_m1")
     still = replace(robot, joints={name: replace(joint, motor=None) for name, joint in robot.joints.items()})
     with pytest.raises(BadRequest, match="has no motor"):
-        singular(still, real=True, points=1)
+        singularities(still, real=True, points=1)

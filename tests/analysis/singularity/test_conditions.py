@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from analysis.singularity.found import found
-from hrsynth.analysis.singularity.singular import singular
+from hrsynth.analysis.singularity.singularities import singularities
 from hrsynth.constraints.condition import _general
 from hrsynth.constraints.vector_algebra import products, vector
-from hrsynth.description import load, shipped
+from hrsynth.description import list_robots, load
 from hrsynth.geometry.vectors import inverse
-from hrsynth.kinematics.relation import relation
+from hrsynth.kinematics.velocity_relation import relation
 from hrsynth.kinematics.walking import random_walk
 from hrsynth.present.show import text
 
@@ -172,7 +172,7 @@ HEAVY = {"6pus", "hexa", "gough_stewart", "quattro"}
 
 
 def test_the_table_has_every_shipped_robot() -> None:
-    assert set(WHOLE) == set(shipped())
+    assert set(WHOLE) == set(list_robots())
 
 
 @pytest.mark.some(2, 6)
@@ -218,7 +218,7 @@ def test_signs_come_with_the_order_of_a_triple_product() -> None:
 def test_a_condition_without_named_wrenches_defines_its_symbols_and_tells_no_angle():
     """Of a robot whose legs have no named wrenches; with names the angle is told."""
     answer = found("3rrr_m1")
-    general = replace(answer, condition=_general(answer.question))
+    general = replace(answer, condition=_general(answer.observation_model))
     assert "named wrenches" in text(answer)
     assert "named wrenches" not in text(general)
     for meaning in general.condition.where.values():
@@ -232,12 +232,12 @@ def test_a_line_and_a_plane_are_told_by_their_vectors():
     """A translating platform slides along a seen vertical line; its seen distance stays where it is at the camera's
     height."""
     see = ["line:platform@0,0,0/0,0,1", "distance:platform@0.1,0,0"]
-    answer = singular("3upu", camera="eye=base@0.3,0,0.3", see=see, points=100)
+    answer = singularities("3upu", camera="eye=base@0.3,0,0.3", see=see, points=100)
     assert answer.words == "z4 is parallel to the plane normal to r5"
     assert answer.examples
     for each in answer.examples:
         assert abs(each.pose.to_dict()["z"] - 0.3) < 1e-6
-    both = singular("3upu", "1", see=see, points=100)
+    both = singularities("3upu", "1", see=see, points=100)
     assert both.words == "the watched directions u1 and the z axes z4 are parallel, also to the plane normal to r5"
 
 
@@ -249,13 +249,13 @@ def test_a_line_and_a_plane_are_told_by_their_vectors():
 def test_as_many_freedoms_are_lost_everywhere_but_not_the_named_ones(robot: str, legs: str, moves: bool) -> None:
     """At configurations of another walk: what is named is lost at the zero configuration, where the words put it."""
     answer = found(robot, legs)
-    count, named = len(answer.verdict.lost), np.column_stack([each.twist for each in answer.verdict.lost])
+    count, named = len(answer.verdict.unobserved), np.column_stack([each.twist for each in answer.verdict.unobserved])
     assert answer.words.startswith(f"always: {count} of {answer.verdict.dof} freedoms")
     assert "(at the zero configuration)" in answer.words
-    start, scale = answer.setting.everything.start, np.repeat([1 / answer.setting.mechanism.length, 1.0], 3)[:, None]
+    start, scale = answer.setup.all_samples.start, np.repeat([1 / answer.setup.mechanism.length, 1.0], 3)[:, None]
     seen = []
     for at in (start, *random_walk(start, 12, seed=8)):
-        lost = relation(at, answer.question).unobserved_twists
+        lost = relation(at, answer.observation_model).unobserved_twists
         lost = np.vstack([lost, np.zeros((6 - len(lost), lost.shape[1]))])
         assert lost.shape[1] >= count
         scaled = scale * named

@@ -210,7 +210,7 @@ def test_three_rods_leave_a_translation_where_they_are_parallel_to_a_plane(seed:
 
 def test_six_lines_of_a_complex_are_dependent_wrenches() -> None:
     answer = found("gough_stewart", real=True)
-    members = [member.configuration for member in answer.setting.samples.members]
+    members = [member.configuration for member in answer.setup.samples.members]
     scene = answer.pattern.values_at(members)
     values = scene.values
     for k, value in enumerate(answer.condition.evaluate(scene)):
@@ -275,7 +275,7 @@ def test_the_factors_that_were_split_off_never_vanish(case: tuple[str, ...]) -> 
     """|a × (Q − P)| is the same at all poses: the length of a crank."""
     answer = found(*case)
     assert isinstance(answer.condition, Named)
-    members = [member.configuration for member in answer.setting.samples.members]
+    members = [member.configuration for member in answer.setup.samples.members]
     poses = answer.pattern.values_at(members)._poses
     for leg in answer.pattern.legs:
         assert isinstance(leg.line, Tangent)

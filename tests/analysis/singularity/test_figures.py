@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from analysis.singularity.found import found
-from hrsynth.analysis.singularity.singular import Example, Singularity
+from hrsynth.analysis.singularity.singularities import Example, Singularity
 from hrsynth.geometry.vectors import Array, inverse, unit
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from kinematics.robots import state_of
@@ -22,24 +22,24 @@ SHARP = 1e-9
 
 def carried(at: ClosedConfiguration, point: Array, link: str) -> Array:
     """Where a point of a link at the zero configuration is now (metres)."""
-    zero = at.twin.mechanism.links[link].pose
+    zero = at.model.mechanism.links[link].pose
     moved = at.pose(link) @ inverse(zero) @ np.append(point, 1.0)
     return np.asarray(moved[:3])
 
 
 def centre(at: ClosedConfiguration, name: str) -> Array:
     """The centre of a joint (metres)."""
-    joint = at.twin.mechanism.joints[name]
+    joint = at.model.mechanism.joints[name]
     return carried(at, joint.point, joint.predecessor)
 
 
 def velocity(at: ClosedConfiguration, twist: Array, point: Array) -> Array:
     """The velocity of a point of the platform for a twist at the platform frame's origin."""
-    return np.asarray(twist[:3] + np.cross(twist[3:], point - at.pose(at.twin.mechanism.platform)[:3, 3]))
+    return np.asarray(twist[:3] + np.cross(twist[3:], point - at.pose(at.model.mechanism.platform)[:3, 3]))
 
 
 def the_lost(example: Example) -> Array:
-    (lost,) = example.lost
+    (lost,) = example.unobserved
     return np.asarray(lost.twist)
 
 
@@ -67,13 +67,13 @@ def test_the_rank_is_lost_there_and_full_a_centimetre_away(case: tuple[str, ...]
 def test_the_oracle_sees_the_same_lost_freedom(case: tuple[str, ...]) -> None:
     """In maximal coordinates, without the engine: one twist of the platform that keeps the watched directions."""
     found = answer(*case)
-    question = found.question
+    observation_model = found.observation_model
     for each in examples(*case):
         at = each.configuration
-        oracle = Oracle(at.twin.mechanism)
-        state = state_of(at.twin, at.q)
+        oracle = Oracle(at.model.mechanism)
+        state = state_of(at.model, at.q)
         assert oracle.error(state) < SHARP
-        basis = oracle.relation(state, question.observations, unit_length=1.0)
+        basis = oracle.relation(state, observation_model.observations, unit_length=1.0)
         _, values, right = np.linalg.svd(basis[6:])
         idle = right[int(np.sum(values > 1e-7)) :].T
         U, sizes, _ = np.linalg.svd(basis[:6] @ idle)
@@ -95,7 +95,7 @@ def test_fig_8_the_lines_along_the_cranks_meet_and_the_platform_turns_about_that
         assert max(np.linalg.norm(np.cross(crank, point - tip)) for crank, tip in zip(cranks, tips, strict=True)) < 1e-8
         np.testing.assert_allclose(velocity(at, lost, point), 0, atol=1e-7 * np.linalg.norm(lost))
         assert abs(lost[5]) > 0.1 * np.linalg.norm(lost)
-        assert "rotation" in each.lost[0].name
+        assert "rotation" in each.unobserved[0].name
 
 
 def test_fig_10b_four_planes_meet_in_a_point() -> None:
@@ -116,7 +116,7 @@ def test_fig_10b_four_planes_meet_in_a_point() -> None:
 
 def tangent(at: ClosedConfiguration, leg: str) -> Array:
     """The unit tangent of the elbow's path, midway between the two balls, from the file's joints."""
-    shoulder = at.twin.mechanism.joints[f"shoulder_{leg}"]
+    shoulder = at.model.mechanism.joints[f"shoulder_{leg}"]
     elbow = (centre(at, f"elbow_{leg}a") + centre(at, f"elbow_{leg}b")) / 2
     return unit(np.cross(shoulder.axis, elbow - shoulder.point))
 
@@ -134,7 +134,7 @@ def test_the_halves_of_the_articulated_platform() -> None:
     """det(τ1, τ4, e) = 0 with e = z × D1D2 from the hinges of the platform."""
     for each in examples("quattro", "1,4"):
         at = each.configuration
-        hinges = [j for j in at.twin.mechanism.joints.values() if j.name.startswith("hinge_")]
+        hinges = [j for j in at.model.mechanism.joints.values() if j.name.startswith("hinge_")]
         one, two = (centre(at, joint.name) for joint in hinges)
         e = unit(np.cross([0, 0, 1.0], two - one))
         assert abs(np.linalg.det([tangent(at, "1"), tangent(at, "4"), e])) < 1e-8

@@ -18,10 +18,10 @@ from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.singularity.locus import Locus, frame_plane
 from hrsynth.analysis.singularity.locus import locus as drawn
 from hrsynth.analysis.singularity.rank_curve import PlaneOfPoses
-from hrsynth.batch.reach import reach, sweep
+from hrsynth.batch.pose_continuation import reach, sweep
 from hrsynth.budgets import COARSE_GRID, LOCUS_SIDES
 from hrsynth.description import load
-from hrsynth.errors import BadRequest, PlaneNotMet
+from hrsynth.errors import BadRequest, NoReachablePose
 from hrsynth.geometry.vectors import unit
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.platform_motion import PlatformMotion
@@ -39,15 +39,15 @@ def planar() -> Locus:
 
 
 def posed(x: float, y: float) -> ClosedConfiguration:
-    samples = found("3rrr_m1").setting.samples
+    samples = found("3rrr_m1").setup.samples
     configurations = [samples.start, *(member.configuration for member in samples.members)]
-    motion = PlatformMotion.of(configurations, samples.question)
-    return reach(samples.start, samples.question, Pose(x=x, y=y, phi=0.0), motion)
+    motion = PlatformMotion.of(configurations, samples.observation_model)
+    return reach(samples.start, samples.observation_model, Pose(x=x, y=y, phi=0.0), motion)
 
 
 def lines(at: ClosedConfiguration, begin: str, end: str) -> float:
     """The determinant of three lines through the tips along begin-end (characteristic lengths), for a normal +z."""
-    tips = [centre(at, f"wrist_{i}")[:2] / at.twin.length for i in "123"]
+    tips = [centre(at, f"wrist_{i}")[:2] / at.model.length for i in "123"]
     along = [unit(centre(at, f"{end}_{i}") - centre(at, f"{begin}_{i}"))[:2] for i in "123"]
     return float(np.linalg.det([[*d, tip[0] * d[1] - tip[1] * d[0]] for d, tip in zip(along, tips, strict=True)]))
 
@@ -124,7 +124,7 @@ def test_the_edge_of_the_map_is_no_limit_of_reach() -> None:
     )
     assert part.reached == 9
     for each, marked in ((part, False), (locus, True)):
-        plane = MapPlane.of(each.grid.axes, found("3rrr_m1").setting.motion, 0.4, 1.6)
+        plane = MapPlane.of(each.grid.axes, found("3rrr_m1").setup.motion, 0.4, 1.6)
         assert bool(_boundary(Figure().subplots(), plane, each)) == marked
 
 
@@ -141,7 +141,7 @@ def test_what_is_not_met_on_the_grid_is_not_called_never(locus: Callable[[], Loc
     from matplotlib.figure import Figure
 
     def told(each: Locus) -> str:
-        plane = MapPlane.of(each.grid.axes, found("3rrr_m1").setting.motion, 0.4, 1.6)
+        plane = MapPlane.of(each.grid.axes, found("3rrr_m1").setup.motion, 0.4, 1.6)
         return _drawn_locus(Figure().subplots(), plane, each.hidden, "hidden robot").get_label()
 
     whole = locus()
@@ -175,12 +175,12 @@ def test_where_the_smallest_value_passes_through_zero_the_expression_does(
 ) -> None:
     """The curve knows the relation alone: its crossings of edges are the expression's, and in nine of ten
     cells in which that changes its sign, or beside them, there is one."""
-    setting = ObservedRobot.of(robot, legs)
-    measured = MeasuredRobot.of_motors(setting) if real else MeasuredRobot.of_directions(setting)
-    located = drawn(setting, plane=plane, steps=STEPS)
-    start, motion, question = setting.everything.start, setting.motion, measured.question
-    configurations = sweep(start, setting.samples.question, located.grid, motion, setting.placer)
-    pieces = PlaneOfPoses(question, motion, located.grid).curve(configurations)
+    setup = ObservedRobot.of(robot, legs)
+    measured = MeasuredRobot.of_motors(setup) if real else MeasuredRobot.of_directions(setup)
+    located = drawn(setup, plane=plane, steps=STEPS)
+    start, motion, observation_model = setup.all_samples.start, setup.motion, measured.observation_model
+    configurations = sweep(start, setup.samples.observation_model, located.grid, motion, setup.placer)
+    pieces = PlaneOfPoses(observation_model, motion, located.grid).curve(configurations)
     assert len(pieces) > 2
     values = (located.real if real else located.hidden).value
     assert (located.real if real else located.hidden).signed
@@ -190,7 +190,7 @@ def test_where_the_smallest_value_passes_through_zero_the_expression_does(
     for piece in pieces:
         for end in piece:
             near = min(reached, key=lambda place: np.linalg.norm(np.subtract(place, end)))
-            at = reach(reached[near], setting.samples.question, located.grid.pose(end.tolist()), motion)
+            at = reach(reached[near], setup.samples.observation_model, located.grid.pose(end.tolist()), motion)
             assert abs(measured.condition.evaluate(measured.pattern.values_at([at]))[0]) < 0.03 * size
     cell = np.array([x[1] - x[0], y[1] - y[0]])
     changes = [
@@ -210,10 +210,10 @@ def test_where_the_smallest_value_passes_through_zero_the_expression_does(
 @pytest.mark.parametrize("degrees", range(5, 360, 50))
 def test_thin_tips_are_within_the_window(degrees: int) -> None:
     """A disc with a needle of 20 degrees, whatever its direction; and the window is no more than a step wider."""
-    setting = ObservedRobot.of("3rrr_m1")
-    motion, length = setting.motion, setting.everything.start.twin.length
+    setup = ObservedRobot.of("3rrr_m1")
+    motion, length = setup.motion, setup.all_samples.start.model.length
     towards = np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees))])
-    centre = motion.position(setting.everything.start.pose(motion.link))[:2]
+    centre = motion.position(setup.all_samples.start.pose(motion.link))[:2]
     end, radius = centre + 1.9 * length * towards, 0.4 * length
 
     def inside(places: np.ndarray) -> np.ndarray:
@@ -223,8 +223,8 @@ def test_thin_tips_are_within_the_window(degrees: int) -> None:
         return needle | (np.linalg.norm(places - centre, axis=1) <= radius)
 
     grid = frame_plane(
-        setting.everything.start,
-        setting.everything.question,
+        setup.all_samples.start,
+        setup.all_samples.observation_model,
         motion,
         Pose(phi=0.0),
         5,
@@ -247,7 +247,7 @@ def test_nothing_that_is_reached_touches_the_window(robot: str, plane: str | Non
 
 
 def test_a_plane_that_is_not_reached() -> None:
-    with pytest.raises(PlaneNotMet) as caught:
+    with pytest.raises(NoReachablePose) as caught:
         drawn(load("delta"), plane="z=5", steps=5)
     assert caught.value.exit_status == 3
     assert "no pose of the plane z=5 is reached" in str(caught.value)
@@ -269,7 +269,7 @@ def test_a_point_on_a_circle_and_the_turn_are_a_plane() -> None:
 
 
 def test_a_plane_whose_poses_depend_on_each_other_says_so() -> None:
-    with pytest.raises(PlaneNotMet, match="parts of this pose depend on each other"):
+    with pytest.raises(NoReachablePose, match="parts of this pose depend on each other"):
         drawn(load("3rps"), plane="phi=0.1", steps=5)
 
 

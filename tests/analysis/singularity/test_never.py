@@ -13,10 +13,10 @@ from scipy.spatial.transform import Rotation
 from analysis.singularity.found import found
 from hrsynth.analysis.aspects.path import path
 from hrsynth.analysis.check import check
-from hrsynth.analysis.singularity.agreement import weakest
-from hrsynth.analysis.singularity.singular import Singularity, singular
+from hrsynth.analysis.singularity.condition_check import weakest
+from hrsynth.analysis.singularity.singularities import Singularity, singularities
+from hrsynth.catalog.architecture_key import parse
 from hrsynth.catalog.geometry import mechanism
-from hrsynth.catalog.words import parse
 from hrsynth.description import load
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.vectors import Array, frozen, inverse, unit
@@ -41,12 +41,12 @@ def mixed(seed: int, off: float | None) -> Mechanism:
 
 
 def told(robot: Mechanism) -> Singularity:
-    return singular(robot, ["1", "2"], points=60)
+    return singularities(robot, ["1", "2"], points=60)
 
 
 def tangents(answer: Singularity) -> tuple[Array, Array, Array]:
     """The rail's and the crank's axis, and the tangents (n, 3) of the crank's elbow on a walk, by link poses."""
-    robot, start = answer.setting.mechanism, answer.setting.everything.start
+    robot, start = answer.setup.mechanism, answer.setup.all_samples.start
     p, a = (robot.joints[f"motor_joint_{i}"].axes[0] for i in (1, 2))
     elbow, centre = robot.joints["elbow_2a"].point, robot.joints["motor_joint_2"].point
     arm = "arm_2"
@@ -66,7 +66,7 @@ def test_a_rail_that_is_not_normal_to_a_cranks_axis_is_never_parallel_to_its_tan
     assert answer.condition.never
     p, a, tau = tangents(answer)
     assert np.linalg.norm(np.cross(tau, p), axis=1).min() >= abs(p @ a) - 1e-9
-    sizes = [weakest(at, answer.question) for at in random_walk(answer.setting.everything.start, 40, seed=5)]
+    sizes = [weakest(at, answer.observation_model) for at in random_walk(answer.setup.all_samples.start, 40, seed=5)]
     assert min(sizes) > 0
 
 
@@ -188,7 +188,7 @@ def test_a_u_joint_that_turns_about_what_is_watched_is_seen(watched: float, tmp_
     file, u, rails, leg = sliding_platform(watched)
     (tmp_path / "puu.urdf").write_text(file)
     robot = str(tmp_path / "puu.urdf")
-    answer = singular(robot, "1,2", points=60)
+    answer = singularities(robot, "1,2", points=60)
     assert answer.condition is not None
     assert answer.condition.never == (watched == 0.0)
     if not watched:
@@ -221,7 +221,7 @@ def couples(at: Array) -> Array:
 
 def test_never_does_not_speak_of_constraint_singularities() -> None:
     """Where the three moments are dependent the 3-UPU can turn about the seen point, which rests."""
-    answer = singular("3upu", see=["position:platform@0,0,0"], points=60)
+    answer = singularities("3upu", see=["position:platform@0,0,0"], points=60)
     assert answer.condition is not None
     assert answer.condition.never
     assert any("constraint singularities" in each for each in answer.unexamined)
@@ -233,7 +233,7 @@ def test_never_does_not_speak_of_constraint_singularities() -> None:
     at = ",".join(f"{name}={value:.15g}" for name, value in zip("xyz", place, strict=True))
     (there,) = check("3upu", see=["position:platform@0,0,0"], at=at).to_dict()["configurations"]
     assert there["dof"] == 4
-    assert there["rank_M"] == 3
+    assert there["rank"] == 3
 
 
 def test_constraint_singularities_are_not_named_where_legs_cannot_turn_the_platform() -> None:
@@ -249,7 +249,7 @@ def test_constraint_singularities_are_not_named_where_legs_cannot_turn_the_platf
             made.joint(
                 f"{kind}{n}_{k}", kind, bodies[n], bodies[n + 1], places[n], axis=a, motor=n == 0, loop=n == 3 and k > 0
             )
-    answer = singular(made.build("platform"), see=["position:platform@0,0,0"], points=60)
+    answer = singularities(made.build("platform"), see=["position:platform@0,0,0"], points=60)
     assert answer.condition is not None
     assert answer.condition.never
     assert answer.unexamined == ()
@@ -261,13 +261,15 @@ def test_what_is_fixed_in_a_platform_that_translates_is_constant(up: float) -> N
     so there is none at all if the line is not in such a plane, and one everywhere else."""
     axis = unit(np.array([1.0, 0.3, up]))
     seen = ["depth:platform@0.1,0,0", f"line:platform@0.1,0.1,0/{text(axis).replace(' ', ',')}"]
-    answer = singular(mechanism(parse("3(Pk*-Ra-Ra-Ra)"), 0), see=seen, points=30)
-    z = answer.setting.mechanism.links["platform"].pose[:3, :3] @ axis @ np.array([0.0, 0.0, 1.0])
+    answer = singularities(mechanism(parse("3(Pk*-Ra-Ra-Ra)"), 0), see=seen, points=30)
+    z = answer.setup.mechanism.links["platform"].pose[:3, :3] @ axis @ np.array([0.0, 0.0, 1.0])
     assert (abs(z) > 0.1) == (up > 0.0)
     assert answer.always == (up == 0.0)
     assert (answer.condition is not None and answer.condition.never) == (up > 0.0)
     if up:
-        sizes = [weakest(at, answer.question) for at in random_walk(answer.setting.everything.start, 30, seed=5)]
+        sizes = [
+            weakest(at, answer.observation_model) for at in random_walk(answer.setup.all_samples.start, 30, seed=5)
+        ]
         assert min(sizes) > 1e-3
 
 
@@ -293,4 +295,4 @@ def test_a_platform_that_rests_is_refused_in_a_line() -> None:
     assert basis.shape[1] == 1  # b turns
     assert np.abs(basis[:6]).max() < 1e-9
     with pytest.raises(BadRequest, match="the platform has no freedom to lose"):
-        singular(robot, points=20)
+        singularities(robot, points=20)

@@ -11,7 +11,7 @@ from scipy.linalg import null_space
 
 from analysis.singularity.test_never import singular_place, sliding_leg, sliding_platform, text
 from hrsynth.analysis.check import check
-from hrsynth.analysis.singularity.singular import Singularity, singular
+from hrsynth.analysis.singularity.singularities import Singularity, singularities
 from hrsynth.geometry.vectors import Array, unit
 
 
@@ -63,7 +63,7 @@ def parallelograms(watched: float) -> tuple[str, Array, list[Array], list[Array]
 def told(tmp_path: Path, file: str, *asked: object, **more: object) -> tuple[str, Singularity]:
     (tmp_path / "robot.urdf").write_text(file)
     robot = str(tmp_path / "robot.urdf")
-    return robot, singular(robot, *asked, points=60, **more)  # type: ignore[arg-type]
+    return robot, singularities(robot, *asked, points=60, **more)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("watched", [0.0, 0.8])
@@ -143,7 +143,7 @@ def test_other_observations_of_a_legs_link_may_fail_at_special_poses(see: str, t
 
 def test_the_inclination_of_a_legs_link_is_compared_with_the_rank():
     """Words and rank of a leg whose observation bears another name than the leg."""
-    answer = singular("prrrp_m1", "1", see=["inclination:dist_2/1,0,0"], points=60)
+    answer = singularities("prrrp_m1", "1", see=["inclination:dist_2/1,0,0"], points=60)
     assert answer.condition is not None
     assert answer.condition.never
     assert answer.checked is not None

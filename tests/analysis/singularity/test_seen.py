@@ -11,11 +11,11 @@ from hrsynth.analysis.aspects.path import path
 from hrsynth.analysis.derive import derive
 from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.analysis.singularity.agreement import spectrum
-from hrsynth.analysis.singularity.singular import Singularity, singular
+from hrsynth.analysis.singularity.condition_check import spectrum
+from hrsynth.analysis.singularity.singularities import Singularity, singularities
 from hrsynth.constraints.vector_algebra import evaluate
 from hrsynth.geometry.vectors import Array
-from hrsynth.kinematics.locked import interaction
+from hrsynth.kinematics.locked_twists import interaction
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
 
@@ -35,7 +35,7 @@ UPRIGHT = "inclination:platform"
 
 
 def seen(*see: str, camera: str | list[str] = EYE, robot: str = "gough_stewart", points: int = 60) -> Singularity:
-    return singular(robot, camera=camera, see=list(see), points=points)
+    return singularities(robot, camera=camera, see=list(see), points=points)
 
 
 def off_the_cylinder(P: Array, C: Array) -> float:
@@ -96,8 +96,8 @@ def test_four_points_are_on_all_danger_cylinders() -> None:
 )
 def test_a_platform_that_translates_has_a_condition_of_all_kinds(see: list[str], words: str) -> None:
     """Three vectors have rank two just there; each is named by what it is."""
-    setting = ObservedRobot.of("delta", camera=EYE, see=see)
-    assert MeasuredRobot.of_directions(setting).condition.words == words
+    setup = ObservedRobot.of("delta", camera=EYE, see=see)
+    assert MeasuredRobot.of_directions(setup).condition.words == words
 
 
 def test_points_on_one_line() -> None:
@@ -197,11 +197,11 @@ def test_words_expression_and_rank_agree(robot: str, camera: str | list[str], se
 @pytest.mark.parametrize("robot", ["gough_stewart", "delta"])
 def test_the_screws_of_all_joints_give_pinocchios_singular_values(robot: str, see: list[str]) -> None:
     """Lengths are in characteristic lengths in both, whatever the robot's size."""
-    setting = ObservedRobot.of(robot, camera="eye=base@0.3,0.1,0.2", see=see)
-    question, chunk = setting.samples.question, setting.configurations[:5]
-    smallest, largest = spectrum(chunk, question)
+    setup = ObservedRobot.of(robot, camera="eye=base@0.3,0.1,0.2", see=see)
+    observation_model, chunk = setup.samples.observation_model, setup.configurations[:5]
+    smallest, largest = spectrum(chunk, observation_model)
     for at, low, high in zip(chunk, smallest, largest, strict=True):
-        found = np.linalg.svd(interaction(at, question), compute_uv=False)
+        found = np.linalg.svd(interaction(at, observation_model), compute_uv=False)
         assert found[-1] == pytest.approx(low, rel=1e-8)
         assert found[0] == pytest.approx(high, rel=1e-8)
 
@@ -231,7 +231,7 @@ def slider_crank() -> Mechanism:
 def test_legs_that_are_not_watched_hold_as_well(see: str, camera: str | None) -> None:
     """With one freedom the condition of what is seen alone is not the robot's: it is that of all joints."""
     robot = slider_crank()
-    found = singular(robot, camera=camera, see=[see], points=60)
+    found = singularities(robot, camera=camera, see=[see], points=60)
     assert found.checked.disagreements == 0
     assert found.checked.smallest > 1e-4
     answer = path(robot, camera=camera, see=see, start="x=0.5", goal="x=0.3")

@@ -23,7 +23,7 @@ from lxml import etree
 sys.path[:0] = [str(Path(__file__).resolve().parents[2])]  # run as a program, this folder alone is on the path
 
 from description.foreign.examples import EXTENDED, FILES  # noqa: E402
-from hrsynth.description import load, native, save, shipped, spanning  # noqa: E402
+from hrsynth.description import list_robots, load, native, save, spanning  # noqa: E402
 from hrsynth.errors import HrsynthError  # noqa: E402
 from hrsynth.mechanism import Mechanism  # noqa: E402
 
@@ -85,7 +85,7 @@ class Hang(BaseException):
 
 def originals() -> list[dict[str, str]]:
     """The files that are mutated: the examples and some shipped robots."""
-    robots = [{"robot.urdf": path.read_text()} for name, path in shipped().items() if name in ("3rrr_m1", "3rps")]
+    robots = [{"robot.urdf": path.read_text()} for name, path in list_robots().items() if name in ("3rrr_m1", "3rps")]
     return [*FILES.values(), *EXTENDED.values(), *robots]
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from description.foreign.examples import TREE, A, B, C, D, _frame, urdf, words
 from description.foreign.test_dialects import lines, mobility
-from hrsynth.analysis.asked import observe
+from hrsynth.analysis.pose_requests import observe
 from hrsynth.description import formats, load
 from hrsynth.description.assembly.candidates import ClosureCandidate, closure_candidates
 from hrsynth.description.jointgraph import JointGraph

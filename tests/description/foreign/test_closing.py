@@ -42,7 +42,7 @@ def press(folder: Path, seed: int, side: float, wide: float = 0.3, drive: float 
 
 
 def includes_zero(robot: Mechanism) -> bool:
-    return all(lower <= 1e-9 and upper >= -1e-9 for lower, upper in robot.limited.values())
+    return all(lower <= 1e-9 and upper >= -1e-9 for lower, upper in robot.joint_ranges.values())
 
 
 @pytest.mark.some(3)
@@ -55,8 +55,8 @@ def test_open_loops_are_closed_within_the_limits(seed: int, side: int, tmp_path:
     assert includes_zero(robot)
     assert robot.filed["knee"] == pytest.approx(
         (
-            robot.limited["knee"][0] + float(robot.joints["knee"].offset[0]),
-            robot.limited["knee"][1] + float(robot.joints["knee"].offset[0]),
+            robot.joint_ranges["knee"][0] + float(robot.joints["knee"].offset[0]),
+            robot.joint_ranges["knee"][1] + float(robot.joints["knee"].offset[0]),
         )
     )
     hrsynth.lint(path, platform="rod", fix=True, output=tmp_path / "mended.urdf")

@@ -51,10 +51,10 @@ def model(name: str) -> Mechanism:
 @pytest.mark.parametrize("name", FIGURES)
 def test_every_model_is_read_closed_and_as_mobile_as_it_is(name: str):
     total, idle, written = FIGURES[name]
-    setting = ObservedRobot.of(model(name), samples=5)
-    assert setting.mobility == Mobility(total, idle)
-    assert setting.mobility_as_written.total == written
-    assert setting.everything.start.residual < 1e-10
+    setup = ObservedRobot.of(model(name), samples=5)
+    assert setup.mobility == Mobility(total, idle)
+    assert setup.mobility_as_written.total == written
+    assert setup.all_samples.start.residual < 1e-10
 
 
 @pytest.mark.parametrize("name", FIGURES)
@@ -80,7 +80,7 @@ def test_the_robot_with_rods_hides_what_the_paper_says():
     found = derive(model("delta-sdf-archirob/model.sdf"))
     assert found.hidden_architecture is not None
     assert found.hidden_architecture.ascii in ("3-Pi-{2-U*S}", "3-Pi-{2-U*U}")
-    assert found.certificate.passed
+    assert found.equivalence.passed
 
 
 @pytest.mark.some(1)
@@ -90,7 +90,7 @@ def test_the_robot_with_rods_hides_what_the_paper_says():
 def test_three_observed_legs_control_all_six_freedoms(name: str, architecture: str):
     found = derive(model(name), "1,3,5")
     assert found.architecture.ascii == architecture
-    assert found.certificate.passed
+    assert found.equivalence.passed
     assert found.verdict.verdict == "controllable"
     assert found.dof == 6
     assert found.hidden is not None
@@ -101,8 +101,8 @@ def test_three_observed_legs_control_all_six_freedoms(name: str, architecture: s
 def test_a_part_of_a_leg_is_a_robot_of_its_own():
     leg = load(MODELS / "gepetto-digit-like", base="tarsus", platform="foot")
     found = check(leg)
-    assert [o.leg for o in found.setting.observed] == ["2", "3"]
+    assert [o.leg for o in found.setup.observed] == ["2", "3"]
     assert found.postures[0].dof == 2
-    assert derive(leg).certificate.passed
+    assert derive(leg).equivalence.passed
     assert leg.base == "tarsus"
     assert len(leg.links) < len(model("gepetto-digit-like").links)

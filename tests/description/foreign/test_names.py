@@ -37,8 +37,8 @@ def answer(texts: dict[str, str], folder: Path, first: str) -> object:
     for name, text in texts.items():
         (folder / name).write_text(text)
     robot = load(folder / first)
-    anatomy = decompose(normal_form(robot).mechanism)
-    return str(anatomy.architecture()), sum(joint.actuated for joint in robot.joints.values())
+    decomposition = decompose(normal_form(robot).mechanism)
+    return str(decomposition.architecture()), sum(joint.actuated for joint in robot.joints.values())
 
 
 def renamed(texts: dict[str, str], old: str, new: str) -> dict[str, str]:

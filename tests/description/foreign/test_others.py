@@ -82,14 +82,14 @@ def path_of(name: str) -> Path:
 def test_mobility_and_verdict_are_those_of_independent_counts(name: str):
     given, mobility, dof, lost = READ[name]
     robot = load(path_of(name), **given)
-    setting = ObservedRobot.of(robot, samples=4)
-    assert setting.mobility_as_written.total == mobility
+    setup = ObservedRobot.of(robot, samples=4)
+    assert setup.mobility_as_written.total == mobility
     whole, normal = Oracle(robot), Oracle(normal_form(robot).mechanism)
     assert whole.mobility(whole.zero()) == mobility
-    relation = normal.relation(normal.zero(), setting.observed)
-    assert setting.dof == dof == _rank(relation[:6])
+    relation = normal.relation(normal.zero(), setup.observed)
+    assert setup.dof == dof == _rank(relation[:6])
     verdict = derive(robot).verdict
-    assert len(verdict.lost) == lost == relation.shape[1] - _rank(relation[6:])
+    assert len(verdict.unobserved) == lost == relation.shape[1] - _rank(relation[6:])
     words = {0: "controllable", dof: "uncontrollable"}
     assert verdict.verdict == words.get(lost, "partially controllable")
 

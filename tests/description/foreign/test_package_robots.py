@@ -86,9 +86,9 @@ def test_every_tree_is_a_mechanism(path: Path):
             load(path)
         return
     robot = load(path, platform=tips[-1])
-    twin = PinocchioModel(robot)
+    model = PinocchioModel(robot)
     free = sum(joint.type.freedoms for joint in robot.joints.values())
-    assert ClosedConfiguration.of(twin, twin.q0).kernel()[0].shape[1] == free - len(robot.couplings)
+    assert ClosedConfiguration.of(model, model.q0).kernel()[0].shape[1] == free - len(robot.couplings)
 
 
 # closed loops: freedoms of the whole with its pelvis held, and of one leg between pelvis and foot
@@ -113,8 +113,8 @@ def test_its_robot_with_closed_loops_has_its_mobility(name: str):
         (whole, load(path, platform="left-foot")),
         (leg, load(path, base="pelvis", platform="left-foot")),
     ):
-        twin = PinocchioModel(robot)
-        kernel, rank = ClosedConfiguration.of(twin, twin.q0).kernel()
+        model = PinocchioModel(robot)
+        kernel, rank = ClosedConfiguration.of(model, model.q0).kernel()
         assert kernel.shape[1] == freedoms
         assert rank.gap > 1e3
 

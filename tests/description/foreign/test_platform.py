@@ -12,7 +12,7 @@ import pytest
 import hrsynth
 from hrsynth.cli import execute
 from hrsynth.description import load
-from hrsynth.errors import BadRequest, GuessedBase, GuessedPlatform
+from hrsynth.errors import AssumedBase, AssumedPlatform, BadRequest
 from hrsynth.mechanism import Mechanism
 
 
@@ -55,7 +55,7 @@ def read(folder: Path, text: str, **given: str) -> Mechanism:
     path = folder / "robot.urdf"
     path.write_text(text)
     with warnings.catch_warnings():
-        for kind in (GuessedBase, GuessedPlatform):
+        for kind in (AssumedBase, AssumedPlatform):
             warnings.simplefilter("ignore", kind)
         return load(path, **given)
 
@@ -190,7 +190,7 @@ def test_every_answer_names_the_platform_and_what_chose_it(
 
 
 def test_a_guess_is_a_warning_in_python_at_the_line_that_asks(bar: Path):
-    with pytest.warns(GuessedPlatform, match="the platform is link 'bar', a guess: the farthest") as caught:
+    with pytest.warns(AssumedPlatform, match="the platform is link 'bar', a guess: the farthest") as caught:
         found = hrsynth.check(bar)
     assert [each.filename for each in caught] == [__file__]
     assert "platform: bar (a guess: the farthest from the base)" in hrsynth.text(found)

@@ -13,8 +13,8 @@ import pytest
 import hrsynth
 from description.foreign.rounded import ENDINGS, exported, in_millimetres, of_hinges
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.description import load, save, shipped
-from hrsynth.description.assembly.idealise import as_meant, nearest
+from hrsynth.description import list_robots, load, save
+from hrsynth.description.assembly.geometry_repair import nearest, snap_geometry
 from hrsynth.description.numerals import Digits
 from hrsynth.errors import BadRequest, LoopsNotClosed, StructureUndecided
 from hrsynth.geometry.vectors import pose, rotation_about, unit
@@ -31,7 +31,7 @@ DECIMALS = (14, 9, 7, 6, 5, 4, 3)
 def answer(robot: Mechanism) -> tuple[object, ...]:
     """What must not depend on the digits."""
     found = ObservedRobot.of(robot, samples=3)
-    return found.anatomy.architecture(), found.dof, found.mobility
+    return found.decomposition.architecture(), found.dof, found.mobility
 
 
 def again(robot: Mechanism, path: Path, decimals: int, significant: bool = False) -> Mechanism:
@@ -62,7 +62,7 @@ def test_a_rounded_robot_is_the_same(name: str, ending: str, decimals: int, tmp_
 
 
 @pytest.mark.some(0, 3)
-@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("name", list_robots())
 def test_every_rounded_robot_is_the_same_or_refused(name: str, tmp_path: Path):
     """With four decimals; connectors with a length, twice as many joints, may leave one file of a robot undecided."""
     meant, undecided = answer(load(name)), list[str]()
@@ -78,7 +78,7 @@ def test_every_rounded_robot_is_the_same_or_refused(name: str, tmp_path: Path):
 
 
 @pytest.mark.some(0, 8)
-@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("name", list_robots())
 def test_a_usd_file_of_single_precision_is_the_same(name: str, tmp_path: Path):
     """As simulators write them: nothing beside the seven digits of single precision; and with four decimals."""
     pytest.importorskip("pxr")
@@ -99,7 +99,7 @@ def test_the_whole_table(decimals: int, significant: bool, tmp_path: Path):
     joints."""
     count = refused = 0
     endings = ENDINGS | ({"usd": ".usda"} if importlib.util.find_spec("pxr") else {})
-    for name in shipped():
+    for name in list_robots():
         meant = answer(load(name))
         for (variant, robot), (dialect, ending) in product(variants(load(name)).items(), endings.items()):
             folder = tmp_path / f"{name} {variant} {dialect}"
@@ -126,10 +126,10 @@ def test_axes_that_miss_each_other_by_far_make_no_ball(name: str, tmp_path: Path
 
 
 @pytest.mark.some(17)
-@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("name", list_robots())
 def test_what_is_not_rounded_stays_as_it_is(name: str):
     robot = load(name)
-    assert as_meant(robot, 0.0, NOISE) is robot
+    assert snap_geometry(robot, 0.0, NOISE) is robot
 
 
 @pytest.mark.some(2)
@@ -322,5 +322,5 @@ def test_a_platform_on_balls_alone_has_no_axes_to_mend(tmp_path: Path):
     file = tmp_path / "rods.sdf"
     file.write_text(text + "</model></sdf>")
     found = ObservedRobot.of(load(file, platform="hub"))
-    assert str(found.anatomy.architecture()) == "5-SS"
+    assert str(found.decomposition.architecture()) == "5-SS"
     assert (found.dof, found.mobility.total) == (1, 6)

@@ -54,7 +54,7 @@ def answer(robot: Mechanism) -> tuple[object, ...]:
     """The hidden architecture, mobility and verdict, which must not depend on the digits."""
     found = ObservedRobot.of(robot, samples=3)
     derived = hrsynth.derive(robot)
-    return str(found.anatomy.architecture()), found.mobility, derived.hidden_architecture, derived.verdict.word
+    return str(found.decomposition.architecture()), found.mobility, derived.hidden_architecture, derived.verdict.word
 
 
 @pytest.mark.some(3, 12)

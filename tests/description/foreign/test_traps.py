@@ -10,9 +10,9 @@ import pytest
 
 from description.foreign.examples import FILES, MJCF, TREE, A, B, C, D, at, ends, mjcf, urdf
 from description.foreign.test_dialects import lines, mobility
-from hrsynth.analysis.asked import observe
+from hrsynth.analysis.pose_requests import observe
 from hrsynth.description import load
-from hrsynth.errors import BadMechanism, BadRequest, HeldByRounding, HrsynthError, LoopsNotClosed, RankUndecided
+from hrsynth.errors import BadMechanism, BadRequest, HrsynthError, LoopsNotClosed, RankBelowRounding, RankUndecided
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism import JointType, Mechanism
@@ -51,8 +51,8 @@ def revolute(pred: str, x: float, succ: str, y: float, rpy: str = "") -> str:
 
 def full_mobility(mechanism: Mechanism) -> int:
     """With gears, by the engine."""
-    twin = PinocchioModel(mechanism)
-    return ClosedConfiguration.of(twin, twin.q0).kernel()[0].shape[1]
+    model = PinocchioModel(mechanism)
+    return ClosedConfiguration.of(model, model.q0).kernel()[0].shape[1]
 
 
 def test_a_flat_zero_pose_is_left_and_said(tmp_path: Path):
@@ -146,11 +146,11 @@ def test_rods_and_axes_of_six_digits_are_equal_and_parallel(tmp_path: Path):
         )
         for name, joint in robot.joints.items()
     }
-    setting = ObservedRobot.of(read(tmp_path, write(replace(robot, joints=joints)).texts[0], "sdf"), samples=3)
+    setup = ObservedRobot.of(read(tmp_path, write(replace(robot, joints=joints)).texts[0], "sdf"), samples=3)
     meant = ObservedRobot.of(robot, samples=3)
-    assert setting.anatomy.architecture() == meant.anatomy.architecture()
-    assert (setting.dof, setting.mobility) == (meant.dof, meant.mobility)
-    (note,) = [note.text for note in setting.robot.notes if "made exact" in note.text]
+    assert setup.decomposition.architecture() == meant.decomposition.architecture()
+    assert (setup.dof, setup.mobility) == (meant.dof, meant.mobility)
+    (note,) = [note.text for note in setup.robot.notes if "made exact" in note.text]
     assert float(note.split("largest change ")[1].split(";")[0]) < 1e-4
 
 
@@ -199,8 +199,8 @@ def test_gears_stay_with_their_joints_whatever_link_is_the_base(tmp_path: Path):
         ("base", "one", 0.5),
         ("base", "two", -0.7),
     ]
-    twin = PinocchioModel(back)
-    at_zero = ClosedConfiguration.of(twin, twin.q0)
+    model = PinocchioModel(back)
+    at_zero = ClosedConfiguration.of(model, model.q0)
     base, one = (at_zero.velocity(link)[5] @ at_zero.kernel()[0] for link in ("base", "one"))
     assert base / (one - base) == pytest.approx(-(1 + 0.5 - 0.7))
     part = read(tmp_path, text, base="base", platform="two")
@@ -220,10 +220,10 @@ def test_a_screw_of_either_convention_couples_turn_and_travel(tmp_path: Path):
     ):
         robot = read(tmp_path, text.format(pitch), "sdf", platform="nut")
         assert full_mobility(robot) == 1
-        twin = PinocchioModel(robot)
-        at_zero = ClosedConfiguration.of(twin, twin.q0)
+        model = PinocchioModel(robot)
+        at_zero = ClosedConfiguration.of(model, model.q0)
         V = at_zero.velocity("nut") @ at_zero.kernel()[0]
-        assert V[2] * twin.length / V[5] == pytest.approx(lead / (2 * np.pi))
+        assert V[2] * model.length / V[5] == pytest.approx(lead / (2 * np.pi))
 
 
 def test_a_gearbox_couples_the_two_joints_on_its_reference_body(tmp_path: Path):
@@ -497,7 +497,7 @@ def test_loops_that_rounding_may_hold_are_refused_as_such(tmp_path: Path):
     main(str(tmp_path), "line_symmetric_bricard")
     whole = (tmp_path / "line_symmetric_bricard.urdf").read_text()
     text = re.sub(r"-?\d+\.\d+(e-?\d+)?", lambda number: f"{float(number[0]):.5f}", whole)
-    with pytest.raises(HeldByRounding, match="1 of their constraints holds by no more than that") as caught:
+    with pytest.raises(RankBelowRounding, match="1 of their constraints holds by no more than that") as caught:
         read(tmp_path, text)
     assert "gap" not in str(caught.value)
     assert caught.value.directions == 1

@@ -11,7 +11,7 @@ from lxml import etree
 
 from description.foreign.test_traps import bars, full_mobility, origin, read
 from description.samples import FOUR_BAR, every_joint
-from hrsynth.description import load, save, shipped, spanning
+from hrsynth.description import list_robots, load, save, spanning
 from hrsynth.description.formats.mjcf.write import write
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.ranks import rank_of
@@ -19,7 +19,7 @@ from hrsynth.mechanism import JointType, Mechanism
 
 ENDINGS = (".xml", ".sdf", ".yaml")
 SOME = ("3rps", "quattro", "rprpr_m1", "gough_stewart")
-ROBOTS = [name if name in SOME else pytest.param(name, marks=pytest.mark.slow) for name in shipped()]
+ROBOTS = [name if name in SOME else pytest.param(name, marks=pytest.mark.slow) for name in list_robots()]
 KINDS = [kind for kind in JointType if kind is not JointType.FREE]
 
 

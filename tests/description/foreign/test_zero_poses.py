@@ -55,10 +55,10 @@ def leg(seed: int, crank: float = 0.0, hips: int = 0) -> str:
 def seen(robot: Mechanism, walk: np.random.Generator) -> dict[tuple[str, ...], int]:
     """How many of the platform's freedoms each set of default segments sees at random configurations, by screws: the
     dof less the dimension of what moves with all directions at rest."""
-    setting = ObservedRobot.of(robot)
-    oracle = Oracle(setting.mechanism)
+    setup = ObservedRobot.of(robot)
+    oracle = Oracle(setup.mechanism)
     (state,) = oracle.random_walk(walk, 1)
-    sets = {each.legs: [o for o in setting.segments if o.leg in each.legs] for each in legs(robot).sets}
+    sets = {each.legs: [o for o in setup.segments if o.leg in each.legs] for each in legs(robot).sets}
     found = {}
     for labels, observed in sets.items():
         rho = oracle.relation(state, observed)
@@ -79,9 +79,9 @@ def test_a_leg_at_a_dead_point_is_judged_at_generic_configurations(seed: int, tm
     special = [note.text for note in robot.notes if "special" in note.text]
     assert len(special) == 1
     (posture,) = check(robot).postures
-    assert not any(posture.hidden.classes.to_dict().values())
-    setting = ObservedRobot.of(robot)
-    assert (setting.everything.led, posture.hidden.rank) == (True, answer.sets[-1].rank)
+    assert not any(posture.hidden.singularity_indices.to_dict().values())
+    setup = ObservedRobot.of(robot)
+    assert (setup.all_samples.led, posture.hidden.rank) == (True, answer.sets[-1].rank)
 
 
 @pytest.mark.some(1)
@@ -101,7 +101,7 @@ def test_every_question_is_answered_at_a_dead_point(tmp_path: Path):
     generic = legs(robot).sets[-1]
     assert posture.hidden.rank == posture.dof
     assert f"but special: {generic.dof - generic.rank} fewer are lost than at generic poses" in str(check(robot))
-    assert modes(robot).found.continuum is not None
+    assert modes(robot).found.continuous_family is not None
     assert derive(robot).verdict.rank == generic.rank
 
 
@@ -286,7 +286,7 @@ def test_a_zero_pose_that_loses_a_freedom_is_called_singular(tmp_path: Path):
     flat = flat.replace('anchor="0.15 0.2 0"', 'anchor="0.15 0 0"')
     stays = read(tmp_path, flat, "xml", platform="b1", base="carriage", keyframe="zero")
     left = read(tmp_path, flat, "xml", platform="b1", base="carriage")
-    assert check(stays).postures[0].hidden.classes.type2
+    assert check(stays).postures[0].hidden.singularity_indices.type2
     assert any("the zero pose is a Type 2 singularity of all legs together" in note.text for note in left.notes)
-    assert not check(left).postures[0].hidden.classes.type2
+    assert not check(left).postures[0].hidden.singularity_indices.type2
     assert [each.rank for each in legs(stays).sets] == [each.rank for each in legs(left, seed=1).sets]

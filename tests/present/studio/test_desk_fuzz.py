@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from hrsynth import shipped
+from hrsynth import list_robots
 from hrsynth.errors import BadRequest, HrsynthError
-from hrsynth.present.studio.desk import Desk, names
+from hrsynth.present.studio.analysis_service import AnalysisService, names
 
 ROBOT = "rrrrr_m1"
 JUNK: list[Any] = [
@@ -69,14 +69,14 @@ LONG = ("aspects", "plane", "servo", "export", "open")
 OPTIONS = ("base", "platform", "motors", "close", "freeze", "keyframe", "unit", "tolerance", "as_written", "observe")
 
 
-def law_plain_or_refused(desk: Desk, asked: Any) -> None:
+def law_plain_or_refused(desk: AnalysisService, asked: Any) -> None:
     found, refused = answered(desk, asked)
     assert all("\n" not in line and len(line) < 3000 for line in refused)
     assert refused or isinstance(found, dict)
     json.dumps(found, allow_nan=False)
 
 
-def answered(desk: Desk, asked: Any) -> tuple[dict[str, Any] | None, list[str]]:
+def answered(desk: AnalysisService, asked: Any) -> tuple[dict[str, Any] | None, list[str]]:
     """The answer, or the lines in which it is refused."""
     try:
         return desk.answer(asked), []
@@ -93,7 +93,7 @@ def test_the_fuzz_knows_every_question():
     "what", [pytest.param(what, marks=pytest.mark.slow) if what in LONG else what for what in sorted(FIELDS)]
 )
 def test_no_field_of_any_question_is_trusted(what: str):
-    desk = Desk()
+    desk = AnalysisService()
     base: dict[str, Any] = {"ask": what, "robot": {"source": f"shipped:{ROBOT}"}, **QUICK.get(what, {})}
     for name in FIELDS[what]:
         for junk in JUNK:
@@ -105,7 +105,7 @@ def test_no_option_of_a_robot_is_trusted():
     for junk in JUNK:
         options = [junk, *({name: junk} for name in OPTIONS)]
         for robot in ({"source": junk}, *({**source, "options": each} for each in options)):
-            law_plain_or_refused(Desk(), {"ask": "move", "robot": robot})
+            law_plain_or_refused(AnalysisService(), {"ask": "move", "robot": robot})
 
 
 @pytest.mark.some(1)
@@ -113,14 +113,14 @@ def test_no_option_of_a_robot_is_trusted():
 def test_a_configuration_that_was_tampered_with_is_refused_or_closed(robot: str):
     rng = random.Random(0)
     source = {"source": f"shipped:{robot}"}
-    here = Desk().answer({"ask": "move", "robot": source, "hidden": True})["here"]
+    here = AnalysisService().answer({"ask": "move", "robot": source, "hidden": True})["here"]
     for _ in range(40):
         q, hidden = [*here["q"]], [*here["hidden"]["q"]]
         for values in (q, hidden):
             if rng.random() < 0.7:
                 values[rng.randrange(len(values))] += rng.choice([1e-12, 1e-9, 1e-6, 0.1, 3.0, 1e5, float("nan")])
         there = {"q": q, "hidden": {**here["hidden"], "q": hidden}}
-        found, refused = answered(Desk(), {"ask": "move", "robot": source, "hidden": True, "here": there})
+        found, refused = answered(AnalysisService(), {"ask": "move", "robot": source, "hidden": True, "here": there})
         assert len(refused) == 1 if found is None else found["residual"] < 1e-9
 
 
@@ -129,7 +129,7 @@ def tree(tmp_path: Path) -> Path:
     """A folder with a robot, beside one that is none of its business."""
     folder = tmp_path / "mine"
     (folder / "deep").mkdir(parents=True)
-    text = shipped()[ROBOT].read_bytes()
+    text = list_robots()[ROBOT].read_bytes()
     for place in (folder / "own.urdf", folder / "deep" / "below.urdf", tmp_path / "other.urdf"):
         place.write_bytes(text)
     (folder / "link.urdf").symlink_to(tmp_path / "other.urdf")
@@ -139,7 +139,7 @@ def tree(tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize("kind", ["folder", "file"])
 def test_nothing_outside_of_the_folder_is_read(tree: Path, kind: str):
-    desk = Desk(**{"folder" if kind == "folder" else "uploads": tree})
+    desk = AnalysisService(**{"folder" if kind == "folder" else "uploads": tree})
     for name in ("own.urdf", "deep/below.urdf"):
         assert desk.answer({"ask": "open", "robot": {"source": f"{kind}:{name}"}})["name"] == ROBOT
     for name in (
@@ -161,13 +161,13 @@ def test_nothing_outside_of_the_folder_is_read(tree: Path, kind: str):
 
 
 def test_a_file_that_is_written_again_is_read_again(tree: Path):
-    desk, robot = Desk(folder=tree), {"source": "folder:own.urdf"}
+    desk, robot = AnalysisService(folder=tree), {"source": "folder:own.urdf"}
     assert desk.answer({"ask": "open", "robot": robot})["name"] == ROBOT
-    (tree / "own.urdf").write_bytes(shipped()["prrrp_m1"].read_bytes())
+    (tree / "own.urdf").write_bytes(list_robots()["prrrp_m1"].read_bytes())
     assert desk.answer({"ask": "open", "robot": robot})["name"] == "prrrp_m1"
 
 
 def test_the_robot_of_the_command_line_has_its_options_and_the_pages():
-    desk = Desk(given={"robot": ROBOT, "options": {"as_written": True}})
+    desk = AnalysisService(given={"robot": ROBOT, "options": {"as_written": True}})
     found = desk.answer({"ask": "open", "robot": {"source": "given", "options": {}}})
     assert found["command"] == f"hrsynth derive {ROBOT} --as-written"

@@ -214,9 +214,9 @@ def test_an_answer_for_other_legs_is_not_shown(tab: Tab, address: str):
 
 def test_at_a_singular_pose_nothing_says_that_all_is_well(tab: Tab, address: str):
     """At the one nearest to home: farther away sliders may come to a pose with a leg in its other working mode."""
-    from hrsynth import singular
+    from hrsynth import singularities
 
-    poses = [example.to_dict()["pose"] for example in singular("rrrrr_m1", points=200).examples]
+    poses = [example.to_dict()["pose"] for example in singularities("rrrrr_m1", points=200).examples]
     page = opened(tab, address, "rrrrr_m1")
     panel = show(page, "legs")
     answered(page)

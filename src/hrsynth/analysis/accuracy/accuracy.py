@@ -13,18 +13,18 @@ from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism.pose import AskedPose, Grid, PoseLike, as_pose, asked_poses
 from ...options import option
-from ...progress import tell
+from ...progress import report
 from ...records import DEG, FLAT, As, Shown, recorded
 from ...results import Result
 from ...tolerances import LARGEST_FIRST_ORDER
-from ..asked import configurations_at
+from ..analysis_declaration import analysis
 from ..observed import POSES, UNLIMITED, CameraLike, LegsLike, NoiseLike, ObservedRobot, RobotLike, Seed, SeeLike
-from ..question import analysis
+from ..pose_requests import configurations_at
 from ..verdict import verdict_of
-from .cones import IN_SIGHT, Blur, Cones, unseen
 from .error_map import ErrorMap, Mapper
+from .measurement_bounds import IN_SIGHT, Cones, MeasurementBounds, unseen
+from .nonlinear_check import NonlinearCheck, true_errors
 from .pose_errors import PoseErrors, error_maxima
-from .sampled import Sampled, true_errors
 from .swept import SweptErrors, require_file, sweep_to
 
 WORST = 3
@@ -43,7 +43,7 @@ class SampledErrors(NamedTuple):
     """The errors at a pose."""
 
     errors: Annotated[PoseErrors, FLAT]
-    sampled: Sampled | None
+    sampled: NonlinearCheck | None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -51,10 +51,10 @@ class Accuracy(Result, shown_as="accuracy"):
     """The error maxima for cones about the observed directions, and for noise of other observations: at single poses,
     over a grid, and, if requested, what samples of true errors give (None otherwise)."""
 
-    setting: Annotated[ObservedRobot, FLAT]
-    blur: Blur
+    setup: Annotated[ObservedRobot, FLAT]
+    bounds: MeasurementBounds
     poses: tuple[PoseErrors, ...]
-    sampled: tuple[Sampled | None, ...]
+    sampled: tuple[NonlinearCheck | None, ...]
     field: Annotated[ErrorMap | None, FLAT]
     swept: Annotated[SweptErrors | None, FLAT] = None
     """What is in a file, where a grid was swept to one."""
@@ -62,11 +62,11 @@ class Accuracy(Result, shown_as="accuracy"):
     @property
     def cones(self) -> Array:
         """Half-angles (k,) of the observed directions (rad), 0 for observations that are not directions."""
-        return self.blur.cones
+        return self.bounds.cones
 
     def headline(self) -> str:
         """The robot, and the largest errors at each pose or of the grid."""
-        limit = LARGEST_FIRST_ORDER * self.setting.everything.twin.length
+        limit = LARGEST_FIRST_ORDER * self.setup.all_samples.model.length
         worst = [
             (
                 f"{1e3 * each.position.largest:.3g} mm"
@@ -80,13 +80,13 @@ class Accuracy(Result, shown_as="accuracy"):
             [] if self.swept is None else [self.swept.tally.reached]
         )
         grid = [f"{count} poses of a grid" for count in reached]
-        return f"{self.setting.headline()}: {'; '.join(worst + grid)}"
+        return f"{self.setup.headline()}: {'; '.join(worst + grid)}"
 
     @property
     @recorded(As("cones"))
     def cones_record(self) -> list[Cone]:
         """The cones about directions that have one."""
-        pairs = zip(self.setting.observed, self.cones, strict=True)
+        pairs = zip(self.setup.observed, self.cones, strict=True)
         return [Cone(o.leg, o.link, cone) for o, cone in pairs if cone]
 
     @property
@@ -97,11 +97,11 @@ class Accuracy(Result, shown_as="accuracy"):
 
     noise = Shown(
         dict[str, float],
-        lambda self: self.blur.amounts,
+        lambda self: self.bounds.amounts,
         "by unit (px, m, rad), of observations that are not directions",
     )
-    exact = Shown(list[str], lambda self: self.blur.exact(self.setting.observed), "observations without errors")
-    unlimited = Shown(list[str], lambda self: self.setting.unlimited, UNLIMITED)
+    exact = Shown(list[str], lambda self: self.bounds.exact(self.setup.observed), "observations without errors")
+    limits_ignored = Shown(list[str], lambda self: self.setup.limits_ignored, UNLIMITED)
 
 
 @analysis(
@@ -166,7 +166,7 @@ def accuracy(
     interrupted sweep. ``observe``, ``camera`` and ``see`` are as for ``derive``.
 
     Raises ``BadRequest`` for unknown names, for invalid cones, if not every freedom is seen (the error is infinite
-    everywhere) or something is behind its camera; ``PoseNotReached``, ``PlaneNotMet``.
+    everywhere) or something is behind its camera; ``PoseNotReached``, ``NoReachablePose``.
 
     >>> hrsynth.accuracy("3rrr_m1", cone="0.1deg", at="x=0,y=0,phi=0")
     <Accuracy: 3rrr_m1, watching 1, 2, 3: 0.414 mm at x=0,y=0,z=0,phi=0deg>
@@ -186,10 +186,10 @@ def accuracy(
             raise BadRequest("samples at the worst poses of a file", nonlinear, "samples at single poses")
     held = None if plane is None else as_pose(plane)
     cells = None if grid is None else Grid.parse(grid, LARGEST_FIELD if into is None else LARGEST_SWEEP)
-    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed).telling(wanted)
-    blur = Blur.of(cone, noise, setting.observed)
-    sees_all(setting)
-    mapper = Mapper(setting, blur)
+    setup = ObservedRobot.of(robot, observe, camera, see=see, seed=seed).telling(wanted)
+    blur = MeasurementBounds.of(cone, noise, setup.observed)
+    sees_all(setup)
+    mapper = Mapper(setup, blur)
     field = swept = None
     if held is not None:
         cells = mapper.plane(held, steps)
@@ -199,41 +199,41 @@ def accuracy(
         field = mapper.over(cells, seed)
     if field is not None and nonlinear and not wanted:
         wanted = [*field.worst(WORST)]
-    start, motion = setting.everything.start, setting.motion
-    configurations = configurations_at(setting, wanted)
+    start, motion = setup.all_samples.start, setup.motion
+    configurations = configurations_at(setup, wanted)
     if not configurations and field is None and swept is None:
         configurations = [start]
-    tell("errors")
-    poses = tuple(errors_at(setting, blur, each) for each in configurations)
+    report("errors")
+    poses = tuple(errors_at(setup, blur, each) for each in configurations)
     true = tuple(
-        true_errors(each, mapper.question, motion, blur, errors, nonlinear, seed) if nonlinear else None
+        true_errors(each, mapper.observation_model, motion, blur, errors, nonlinear, seed) if nonlinear else None
         for each, errors in zip(configurations, poses, strict=True)
     )
-    return Accuracy(setting, blur, poses, true, field, swept)
+    return Accuracy(setup, blur, poses, true, field, swept)
 
 
-def errors_at(setting: ObservedRobot, blur: Blur, at: ClosedConfiguration) -> PoseErrors:
+def errors_at(setup: ObservedRobot, blur: MeasurementBounds, at: ClosedConfiguration) -> PoseErrors:
     """The error maxima at a closed configuration; raises ``BadRequest`` where something is behind its camera."""
-    motion, question = setting.motion, setting.samples.question
-    pose, lost = motion.pose(at.pose(motion.link)), unseen(at, question)
+    motion, observation_model = setup.motion, setup.samples.observation_model
+    pose, lost = motion.pose(at.pose(motion.link)), unseen(at, observation_model)
     if lost is not None:
         raise BadRequest(
-            f"{setting.robot.name}: {lost.kind} {lost.leg} is not in front of its camera", str(pose), IN_SIGHT
+            f"{setup.robot.name}: {lost.kind} {lost.leg} is not in front of its camera", str(pose), IN_SIGHT
         )
-    return error_maxima(at, question, blur, pose)
+    return error_maxima(at, observation_model, blur, pose)
 
 
-def sees_all(setting: ObservedRobot, otherwise: str = "the error is infinite at every pose, ") -> None:
+def sees_all(setup: ObservedRobot, otherwise: str = "the error is infinite at every pose, ") -> None:
     """Raise ``BadRequest`` where the observed legs do not see all of the platform's freedoms, saying what follows."""
-    verdict = verdict_of(setting, setting.labels, setting.samples)
-    if verdict.lost:
+    verdict = verdict_of(setup, setup.labels, setup.samples)
+    if verdict.unobserved:
         what, cure = (
             ("the legs do", "legs that make")
-            if all(each.by_segment for each in setting.observed)
+            if all(each.by_segment for each in setup.observed)
             else ("what is observed does", "observations that make")
         )
         raise BadRequest(
-            f"{setting.robot.name}: {otherwise}{what} not see {verdict.named}",
-            ", ".join(setting.labels),
+            f"{setup.robot.name}: {otherwise}{what} not see {verdict.named}",
+            ", ".join(setup.labels),
             f"{cure} it controllable (hrsynth legs lists them, hrsynth advise what else to measure)",
         )

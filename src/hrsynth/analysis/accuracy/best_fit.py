@@ -21,9 +21,9 @@ from ...errors import LoopsNotClosed
 from ...geometry.vectors import Array
 from ...kinematics.chart import TangentChart
 from ...kinematics.configuration import ClosedConfiguration, measure
-from ...kinematics.relation import Measurement, relation
+from ...kinematics.velocity_relation import ObservationModel, relation
 from ...tolerances import FLAT_CURVATURE, FOLLOWED, HESSIAN_CHANGE, HESSIAN_STEP, INVERTED
-from ..classes import interaction_matrix
+from ..singularity_indices import interaction_matrix
 
 FIT, ENDS, NOT_FOUND = "fit", "ends", "not found"
 CORRECTIONS = 8
@@ -53,16 +53,16 @@ class _Bowl:
     """F around a configuration, in the coordinates y (n,) of a chart there."""
 
     at: ClosedConfiguration
-    question: Measurement
+    observation_model: ObservationModel
 
     @cached_property
     def chart(self) -> TangentChart:
-        return TangentChart.around(self.at, self.question)
+        return TangentChart.around(self.at, self.observation_model)
 
     def errors(self, at: ClosedConfiguration, wanted: Values) -> tuple[Array, Array]:
         """All errors e at a configuration, and their rates J (rows, n) in y."""
-        u, rates = observed_values(at, self.question)
-        every = list(zip(self.question.observations, u, wanted, strict=True))
+        u, rates = observed_values(at, self.observation_model)
+        every = list(zip(self.observation_model.observations, u, wanted, strict=True))
         kernel, _ = at.kernel()
         forth = kernel @ np.linalg.pinv(self.chart.slope(at.q) @ kernel, rcond=INVERTED)
         rows = np.vstack([o.error_slope(v, w) @ r for (o, v, w), r in zip(every, rates, strict=True)]) @ forth
@@ -101,24 +101,24 @@ class _Bowl:
         return None
 
 
-def observed_values(at: ClosedConfiguration, question: Measurement) -> tuple[list[Array], list[Array]]:
+def observed_values(at: ClosedConfiguration, observation_model: ObservationModel) -> tuple[list[Array], list[Array]]:
     """The value (size,) of each observation and its rates (size, nv)."""
-    return measure(at.twin, at.q, question.reference, question.observations)[2:]
+    return measure(at.model, at.q, observation_model.reference, observation_model.observations)[2:]
 
 
-def weakest(at: ClosedConfiguration, question: Measurement) -> float:
+def weakest(at: ClosedConfiguration, observation_model: ObservationModel) -> float:
     """The smallest singular value of Mᵀ (characteristic lengths), infinite where Mᵀ does not exist."""
-    M = interaction_matrix(relation(at, question))
+    M = interaction_matrix(relation(at, observation_model))
     return np.inf if M is None else float(np.linalg.svd(M, compute_uv=False)[-1])
 
 
-def best_fits(at: ClosedConfiguration, question: Measurement, wanted: Wanted) -> Fit:
+def best_fits(at: ClosedConfiguration, observation_model: ObservationModel, wanted: Wanted) -> Fit:
     """The curve of best fits from a configuration whose directions are ``wanted(0)``, led to ``wanted(1)``."""
     way, done, step = [at], 0.0, BEST_FIT_FIRST_STEP
-    bowl = _Bowl(at, question)
+    bowl = _Bowl(at, observation_model)
     H = first = bowl.hessian(wanted(0.0))
     if _least(H) <= 0:
-        return Fit((at,), 0.0, weakest(at, question), NOT_FOUND)
+        return Fit((at,), 0.0, weakest(at, observation_model), NOT_FOUND)
     for _ in range(BEST_FIT_STEPS):
         if done == 1.0 or step < BEST_FIT_SHORTEST_STEP:
             break
@@ -130,7 +130,7 @@ def best_fits(at: ClosedConfiguration, question: Measurement, wanted: Wanted) ->
             way.append(bowl.at)
         step *= float(np.clip(AIMED / max(change, 1e-12), 0.25, 2.0))
     outcome = FIT if done == 1.0 else ENDS if _least(H) < FLAT_CURVATURE * _least(first) else NOT_FOUND
-    return Fit(tuple(way), done, min(weakest(each, question) for each in way), outcome)
+    return Fit(tuple(way), done, min(weakest(each, observation_model) for each in way), outcome)
 
 
 def _newton_step(bowl: _Bowl, H: Array, wanted: Wanted, ahead: float) -> tuple[_Bowl, Array] | None:
@@ -141,7 +141,7 @@ def _newton_step(bowl: _Bowl, H: Array, wanted: Wanted, ahead: float) -> tuple[_
         found = bowl.minimum(H, wanted(ahead), guess)
         if found is None:
             return None
-        there = _Bowl(found, bowl.question)
+        there = _Bowl(found, bowl.observation_model)
         return there, there.hessian(wanted(ahead))
     except LoopsNotClosed:
         return None

@@ -12,21 +12,21 @@ from numpy.typing import NDArray
 
 from ...batch.engine import Batch, Evaluation
 from ...batch.grids import poses_over
-from ...batch.reach import grid_dependence, reach, sweep
+from ...batch.pose_continuation import grid_dependence, reach, sweep
 from ...budgets import LARGEST_GRID, POSES_FOR_NUMBA_ONCE
-from ...errors import BadRequest, Disagreement, HrsynthError, PlaneNotMet
+from ...errors import BadRequest, Disagreement, HrsynthError, NoReachablePose
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.relation import Measurement
+from ...kinematics.velocity_relation import ObservationModel
 from ...mechanism.pose import Grid, Pose
-from ...progress import tell
+from ...progress import report
 from ...records import DEG, FLAT, MM, As, Recorded, Table
 from ...results import Value
 from ...tolerances import SAME_RELATION, USUAL_ERROR
 from ..observed import ObservedRobot
 from ..singularity.locus import frame_plane
 from ..singularity.rank_curve import PlaneOfPoses
-from .cones import Blur, unseen
+from .measurement_bounds import MeasurementBounds, unseen
 from .pose_errors import maxima, reading
 
 Flags = NDArray[np.bool_]
@@ -39,7 +39,7 @@ FINE, COARSE = 201, 41
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Seen(Value):
+class ErrorField(Value):
     """Poses of a sweep, in any number: whether each is reached, the largest position (m) and orientation error (rad),
     the determinant of the directions' rates (None where they are not as many as freedoms), the smallest singular value
     of Mᵀ; NaN where not reached, all (n,). ``gap`` bounds how much too large an error may be, relative; ``curve`` gives
@@ -55,7 +55,7 @@ class Seen(Value):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Spots(Value, all_recorded=True):
+class SpotChecks(Value, all_recorded=True):
     """Random poses of a grid at which Pinocchio's relation gave the same error maxima: how many, and the largest
     difference (relative)."""
 
@@ -75,8 +75,8 @@ class ErrorMap(Value):
     position: Annotated[Array, Table, As("position_mm", scale=MM)]
     orientation: Annotated[Array, Table, As("orientation_deg", scale=DEG)]
     gap: Recorded[float]
-    seen: Seen
-    spots: Annotated[Spots | None, As("checked")]
+    seen: ErrorField
+    spots: Annotated[SpotChecks | None, As("checked")]
     smallest_at: Callable[[Array], Array] | None
     dependent: str | None = None
 
@@ -109,51 +109,51 @@ class ErrorMap(Value):
 class Mapper(Value):
     """What evaluates grids for what is observed and how wrong that may be."""
 
-    setting: ObservedRobot
-    blur: Blur
+    setup: ObservedRobot
+    blur: MeasurementBounds
 
     @property
-    def question(self) -> Measurement:
+    def observation_model(self) -> ObservationModel:
         """What is asked at each pose."""
-        return self.setting.samples.question
+        return self.setup.samples.observation_model
 
     @cached_property
     def batch(self) -> Batch | None:
         """The batch, where it knows all legs, all observed directions are its own, and any pose is one of the
         platform's."""
-        defaults = set(map(id, self.setting.segments))
-        if not all(id(o) in defaults for o in self.setting.observed):
+        defaults = set(map(id, self.setup.segments))
+        if not all(id(o) in defaults for o in self.setup.observed):
             return None
-        batch = self.setting.batch
+        batch = self.setup.batch
         return batch if batch is not None and batch.complete and batch.coordinates.constant else None
 
     def plane(self, plane: Pose, steps: int | None) -> Grid:
         """The grid over what is reached of a plane."""
-        everything, motion = self.setting.everything, self.setting.motion
+        all_samples, motion = self.setup.all_samples, self.setup.motion
 
         def met(first: ClosedConfiguration, coarse: Grid) -> Flags:
             if self.batch is not None:
-                X, possible = poses_over(motion, coarse, self.setting.robot.name, coarse.places())
+                X, possible = poses_over(motion, coarse, self.setup.robot.name, coarse.places())
                 return possible & self.batch.evaluate(X).reached
-            return np.array([at is not None for at in sweep(first, everything.question, coarse, motion)])
+            return np.array([at is not None for at in sweep(first, all_samples.observation_model, coarse, motion)])
 
         count = steps or (FINE if self.batch is not None else COARSE)
-        return frame_plane(everything.start, everything.question, motion, plane, count, met)
+        return frame_plane(all_samples.start, all_samples.observation_model, motion, plane, count, met)
 
     def over(self, grid: Grid, seed: int, checked: int = SPOTS) -> ErrorMap:
-        """The error maxima over a grid, by the batch ``checked`` at so many poses; raises ``PlaneNotMet`` where no pose
-        of it is reached, ``BadRequest`` where poses have to be found one by one and are too many for that."""
-        name = self.setting.robot.name
+        """The error maxima over a grid, by the batch ``checked`` at so many poses; raises ``NoReachablePose`` where no
+        pose of it is reached, ``BadRequest`` where poses have to be found one by one and are too many for that."""
+        name = self.setup.robot.name
         if self.batch is None and grid.size > LARGEST_GRID:
             raise BadRequest(
                 f"{name}: poses are found one by one; number of poses", grid.size, f"at most {LARGEST_GRID}"
             )
         seen = self._one_by_one(grid) if self.batch is None else self._together(grid)
         dependent = (
-            None if seen.reached.all() else (grid_dependence(self.setting.everything.start, self.setting.motion, grid))
+            None if seen.reached.all() else (grid_dependence(self.setup.all_samples.start, self.setup.motion, grid))
         )
         if not seen.reached.any():
-            raise PlaneNotMet(name, f"the grid {grid}", f"none of {grid.size} is", dependent)
+            raise NoReachablePose(name, f"the grid {grid}", f"none of {grid.size} is", dependent)
         spots = smallest_at = None
         if self.batch is not None:
             spots, smallest_at = self.spots(grid, seen, seed, checked), partial(self._smallest, grid)
@@ -163,11 +163,11 @@ class Mapper(Value):
             grid, seen.reached.reshape(shape), position, orientation, seen.gap, seen, spots, smallest_at, dependent
         )
 
-    def _together(self, grid: Grid) -> Seen:
+    def _together(self, grid: Grid) -> ErrorField:
         """Poses by the batch; of a part of them no more is kept than their errors."""
         parts = [self.errors(*part) for part in self.parts(grid, self.blur.cones)]
         reached, position, orientation = (np.concatenate([part[i] for part in parts]) for i in range(3))
-        return Seen(
+        return ErrorField(
             reached,
             position,
             orientation,
@@ -209,33 +209,33 @@ class Mapper(Value):
         size = -(-count // max(1, count // PART))
         compiled = self.uses_numba(count, cones)
         for start in range(0, count, size):
-            tell("poses")
+            report("poses")
             here = grid.places(start, start + size) if places is None else places[start : start + size]
             yield self.part(grid, here, cones, compiled)
 
     def uses_numba(self, count: int, cones: Array | None) -> bool:
         """Whether so many poses are done by numba."""
         assert self.batch is not None
-        return self.batch.uses_numba(count, self.setting.labels, cones, POSES_FOR_NUMBA_ONCE)
+        return self.batch.uses_numba(count, self.setup.labels, cones, POSES_FOR_NUMBA_ONCE)
 
     def part(self, grid: Grid, places: Array, cones: Array | None, compiled: bool) -> tuple[Flags, Evaluation]:
         """Which poses at some places of a grid the platform can have at all, and what the batch says of them."""
         assert self.batch is not None
-        X, possible = poses_over(self.setting.motion, grid, self.setting.robot.name, places)
-        return possible, self.batch.evaluate(X, self.setting.labels, cones, compiled=compiled)
+        X, possible = poses_over(self.setup.motion, grid, self.setup.robot.name, places)
+        return possible, self.batch.evaluate(X, self.setup.labels, cones, compiled=compiled)
 
-    def _one_by_one(self, grid: Grid) -> Seen:
-        everything = self.setting.everything
-        found = sweep(everything.start, everything.question, grid, self.setting.motion, self.setting.placer)
+    def _one_by_one(self, grid: Grid) -> ErrorField:
+        all_samples = self.setup.all_samples
+        found = sweep(all_samples.start, all_samples.observation_model, grid, self.setup.motion, self.setup.placer)
         table = np.full((5, len(found)), np.nan)
         for i, at in enumerate(found):
-            if at is not None and unseen(at, self.question) is None:
-                tell("errors")
-                rates, twists = reading(at, self.question)
-                table[:4, i] = maxima(at, self.question, self.blur).ravel()
-                table[4, i] = _weakest(rates, twists, at.twin.length)
-        plane = PlaneOfPoses(self.question, self.setting.motion, grid)
-        return Seen(
+            if at is not None and unseen(at, self.observation_model) is None:
+                report("errors")
+                rates, twists = reading(at, self.observation_model)
+                table[:4, i] = maxima(at, self.observation_model, self.blur).ravel()
+                table[4, i] = _weakest(rates, twists, at.model.length)
+        plane = PlaneOfPoses(self.observation_model, self.setup.motion, grid)
+        return ErrorField(
             np.isfinite(table[4]),
             table[0],
             table[1],
@@ -246,8 +246,8 @@ class Mapper(Value):
         )
 
     def spots(
-        self, grid: Grid, seen: Seen, seed: int, count: int = SPOTS, cells: NDArray[np.int64] | None = None
-    ) -> Spots:
+        self, grid: Grid, seen: ErrorField, seed: int, count: int = SPOTS, cells: NDArray[np.int64] | None = None
+    ) -> SpotChecks:
         """Hold the batch against Pinocchio at random poses of those that are ``seen``, all of a grid or those at some
         ``cells``; raises ``Disagreement``."""
         sizes = [np.where(np.isfinite(each), each, 0.0) for each in (seen.position, seen.orientation)]
@@ -262,26 +262,32 @@ class Mapper(Value):
                 continue
             met += 1
             for mine, theirs, all_of in zip(
-                (seen.position[i], seen.orientation[i]), maxima(at, self.question, self.blur)[0], sizes, strict=True
+                (seen.position[i], seen.orientation[i]),
+                maxima(at, self.observation_model, self.blur)[0],
+                sizes,
+                strict=True,
             ):
                 scale = max(mine, float(np.median(all_of[all_of > 0])) if (all_of > 0).any() else 1.0)
                 largest = max(largest, abs(mine - theirs) / scale)
         if largest > SAME_RELATION + seen.gap:
-            raise Disagreement(self.setting.robot.name, met, largest)
-        return Spots(met, float(largest))
+            raise Disagreement(self.setup.robot.name, met, largest)
+        return SpotChecks(met, float(largest))
 
     def _configurations(self, grid: Grid, chosen: NDArray[np.int64]) -> list[ClosedConfiguration | None]:
         """The closed configurations at cells of a grid."""
-        setting = self.setting
-        X, _ = poses_over(setting.motion, grid, setting.robot.name, grid.places_at(chosen))
-        if setting.placer is not None:
-            return setting.placer.configurations(X)
+        setup = self.setup
+        X, _ = poses_over(setup.motion, grid, setup.robot.name, grid.places_at(chosen))
+        if setup.placer is not None:
+            return setup.placer.configurations(X)
         found: list[ClosedConfiguration | None] = []
         for each in X:
             try:
                 found.append(
                     reach(
-                        setting.everything.start, setting.everything.question, setting.motion.pose(each), setting.motion
+                        setup.all_samples.start,
+                        setup.all_samples.observation_model,
+                        setup.motion.pose(each),
+                        setup.motion,
                     )
                 )
             except HrsynthError:

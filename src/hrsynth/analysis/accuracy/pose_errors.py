@@ -17,12 +17,12 @@ from ...geometry.vectors import Array, orient_axis
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.joint_coordinates import FileCoordinates
 from ...kinematics.limits import outside
-from ...kinematics.relation import Measurement, relation
+from ...kinematics.velocity_relation import ObservationModel, relation
 from ...mechanism.pose import Pose
 from ...records import DEG, MM, SCALED, As, Number, recorded
 from ...results import Value
 from ...tolerances import FOLLOWED, INVERTED, RANK_CUTOFF
-from .cones import Blur
+from .measurement_bounds import MeasurementBounds
 
 VIEWS = 2000
 """Directions on the half-sphere from which the largest and the least error are sought."""
@@ -40,10 +40,9 @@ class ErrorEllipsoid(Value):
     with its own, among the directions in which there are errors at all.
 
     ``errors`` (k, 3) are the errors that give the largest one that was found, of directions in radians, else in the
-    balls that :class:`.Blur` tells. Of three balls and more ``largest`` is an upper bound, which may be by ``gap`` too
-    large, as a part of the error that is attained. Where a freedom is lost ``largest`` is infinite and ``errors`` is
-    None; where there are no errors both are zero and the directions are None.
-    """
+    balls that :class:`.MeasurementBounds` tells. Of three balls and more ``largest`` is an upper bound, which may be by
+    ``gap`` too large, as a part of the error that is attained. Where a freedom is lost ``largest`` is infinite and
+    ``errors`` is None; where there are no errors both are zero and the directions are None."""
 
     largest: Annotated[float, Number, SCALED]
     direction: Annotated[Array | None, list[float] | None]
@@ -70,44 +69,46 @@ class PoseErrors(Value, all_recorded=True):
     pose: Pose
     position: Annotated[ErrorEllipsoid, As("position_mm", scale=MM)]
     orientation: Annotated[ErrorEllipsoid, As("orientation_deg", scale=DEG)]
-    beyond: tuple[str, ...] = ()
+    beyond_limits: tuple[str, ...] = ()
     """The joints that are beyond their limits at the pose."""
     coordinates: FileCoordinates | None = None
 
 
-def reading(at: ClosedConfiguration, question: Measurement) -> tuple[Array, Array]:
+def reading(at: ClosedConfiguration, observation_model: ObservationModel) -> tuple[Array, Array]:
     """ρ as rates (3 k, r) of the directions and twists (6, r; m, rad) on the same basis: Mᵀ and its twists, where Mᵀ
     exists, and the least squares law of the measurements where it does not."""
-    found = relation(at, question)
+    found = relation(at, observation_model)
     twists = np.zeros((6, found.dimension))
     twists[: found.twist_rows] = found.twist_part
-    twists[:3] *= at.twin.length
+    twists[:3] *= at.model.length
     return found.rates, twists
 
 
-def maxima(at: ClosedConfiguration, question: Measurement, blur: Blur) -> Array:
+def maxima(at: ClosedConfiguration, observation_model: ObservationModel, blur: MeasurementBounds) -> Array:
     """Upper and lower bounds (2, 2) of the largest position (m) and orientation error (rad) at a configuration, one in
     each column; infinite where a freedom is lost."""
     return np.stack(
         [
             np.full(2, np.inf) if part is None else np.ravel(bounds_of_maps(part.J[None], part.only))
-            for part in _parts(at, question, blur)
+            for part in _parts(at, observation_model, blur)
         ],
         axis=1,
     )
 
 
-def largest_by_ascent(at: ClosedConfiguration, question: Measurement, blur: Blur) -> tuple[float, float]:
+def largest_by_ascent(
+    at: ClosedConfiguration, observation_model: ObservationModel, blur: MeasurementBounds
+) -> tuple[float, float]:
     """The largest position (m) and orientation error (rad) that an ascent from many views finds: as :func:`maxima`, but
     a lower bound of it, where six legs are watched in a sixth of the time."""
-    position, orientation = (_axes(part, 1) for part in _parts(at, question, blur))
+    position, orientation = (_axes(part, 1) for part in _parts(at, observation_model, blur))
     return _longest(position), _longest(orientation)
 
 
-def error_axes(at: ClosedConfiguration, question: Measurement, blur: Blur) -> Array | None:
+def error_axes(at: ClosedConfiguration, observation_model: ObservationModel, blur: MeasurementBounds) -> Array | None:
     """Three axes (3, 3), by rows, as long as the largest position errors (m) along them, the first along the largest
     that an ascent finds, the next along the largest normal to it; None where a freedom is lost that moves it."""
-    return _axes(next(_parts(at, question, blur)), 3)
+    return _axes(next(_parts(at, observation_model, blur)), 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,11 +130,13 @@ class ErrorMaps:
         return left[:, :count], self.J.reshape(3, -1, 3).transpose(1, 2, 0)
 
 
-def _parts(at: ClosedConfiguration, question: Measurement, blur: Blur) -> Iterator[ErrorMaps | None]:
+def _parts(
+    at: ClosedConfiguration, observation_model: ObservationModel, blur: MeasurementBounds
+) -> Iterator[ErrorMaps | None]:
     """Of position and orientation, None where a freedom is lost that moves it: δt = T (E R)⁺ E δy for rates R of the
     values and twists T on one basis, E the slopes of what is fed back."""
-    rates, twists = reading(at, question)
-    errors = blur.at(at, question)
+    rates, twists = reading(at, observation_model)
+    errors = blur.at(at, observation_model)
     rows = errors.rows(rates)
     lost, _ = kernel_basis(rows, 1.0)
     inverse = np.linalg.pinv(rows, rcond=RANK_CUTOFF)
@@ -160,10 +163,12 @@ def _longest(axes: Array | None) -> float:
     return np.inf if axes is None else float(np.linalg.norm(axes[0]))
 
 
-def error_maxima(at: ClosedConfiguration, question: Measurement, blur: Blur, pose: Pose) -> PoseErrors:
+def error_maxima(
+    at: ClosedConfiguration, observation_model: ObservationModel, blur: MeasurementBounds, pose: Pose
+) -> PoseErrors:
     """The error maxima at a configuration with their directions."""
-    position, orientation = map(_extent, _parts(at, question, blur))
-    return PoseErrors(pose, position, orientation, tuple(outside(at.twin, at.q)), FileCoordinates.of(at))
+    position, orientation = map(_extent, _parts(at, observation_model, blur))
+    return PoseErrors(pose, position, orientation, tuple(outside(at.model, at.q)), FileCoordinates.of(at))
 
 
 def _extent(part: ErrorMaps | None) -> ErrorEllipsoid:

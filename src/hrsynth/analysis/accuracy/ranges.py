@@ -20,7 +20,7 @@ class ErrorRange(Value):
 
     least: Annotated[float | None, SCALED] = None
     largest: Annotated[float | None, SCALED] = None
-    loose: Annotated[int, "how many are larger"] = 0
+    slack: Annotated[int, "how many are larger"] = 0
     infinite: Recorded[int] = 0
     moves: bool = False
 
@@ -41,7 +41,7 @@ class ErrorRange(Value):
         return ErrorRange(
             min(lows, default=None),
             max(highs, default=None),
-            self.loose + other.loose,
+            self.slack + other.slack,
             self.infinite + other.infinite,
             self.moves or other.moves,
         )

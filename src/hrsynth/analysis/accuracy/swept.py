@@ -18,15 +18,15 @@ from numpy.typing import NDArray
 
 from ...budgets import SWEEP_DRAWN, SWEEP_PART
 from ...description.files import as_path, open_kept, require_alone, require_writable, seal_line, unseal_line
-from ...errors import BadRequest, BuildStopped, PlaneNotMet
+from ...errors import BadRequest, BuildStopped, NoReachablePose
 from ...geometry.vectors import Array
 from ...mechanism.pose import Grid
-from ...progress import tell
+from ...progress import report
 from ...records import DEG, FLAT, MM, As, Shown, recorded
 from ...results import Value, content
 from ...tolerances import LARGEST_FIRST_ORDER
 from ...version import __version__
-from .error_map import SPOTS, Mapper, Seen, Spots
+from .error_map import SPOTS, ErrorField, Mapper, SpotChecks
 from .ranges import ErrorRange, Tally
 
 ENDING, PART, JOURNAL = ".npy", ".part", ".journal"
@@ -53,7 +53,7 @@ class SweptErrors(Value):
     grid: Annotated[Grid, FLAT]
     file: Path
     tally: Tally
-    spots: Annotated[Spots, Spots | None, As("checked")]
+    spots: Annotated[SpotChecks, SpotChecks | None, As("checked")]
     before: int
 
     gap = Shown(float, lambda self: self.tally.gap)
@@ -77,21 +77,21 @@ def sweep_to(path: str | Path, mapper: Mapper, grid: Grid, seed: int) -> SweptEr
         file: at work, or broken off.
     BuildStopped
         Where the disk takes no more; what was written is kept.
-    PlaneNotMet
+    NoReachablePose
         Where no pose of the grid is reached.
     """
-    name, target = mapper.setting.robot.name, require_file(path)
+    name, target = mapper.setup.robot.name, require_file(path)
     if mapper.batch is None:
         raise BadRequest(f"{name}: poses are found one by one, not in parts", str(path), "another file, as map.csv")
     cones = mapper.blur.cones
     asked = hashlib.sha256(
         repr(
-            content((mapper.setting.mechanism, mapper.setting.observed, mapper.blur, grid, SWEEP_PART, __version__))
+            content((mapper.setup.mechanism, mapper.setup.observed, mapper.blur, grid, SWEEP_PART, __version__))
         ).encode()
     ).hexdigest()
     with _SweepDraft(target, grid, asked, mapper.uses_numba(grid.size, cones)) as draft:
         tally = draft.tally
-        limits = [LARGEST_FIRST_ORDER * mapper.setting.everything.twin.length, LARGEST_FIRST_ORDER]
+        limits = [LARGEST_FIRST_ORDER * mapper.setup.all_samples.model.length, LARGEST_FIRST_ORDER]
         for start in range(tally.done, grid.size, SWEEP_PART):
             places = grid.places(start, start + SWEEP_PART)
             reached, *errors, gap = mapper.errors(*mapper.part(grid, places, cones, draft.compiled))
@@ -99,17 +99,17 @@ def sweep_to(path: str | Path, mapper: Mapper, grid: Grid, seed: int) -> SweptEr
             position, orientation = map(ErrorRange.of, errors, limits)
             tally = tally.with_part(len(rows), int(reached.sum()), position, orientation, gap)
             draft.add(rows, tally)
-            tell(f"poses, {100 * tally.done // grid.size} % of {grid.size}")
+            report(f"poses, {100 * tally.done // grid.size} % of {grid.size}")
         if not tally.reached:
             draft.discard()
-            raise PlaneNotMet(name, f"the grid {grid}", f"none of {grid.size} is")
+            raise NoReachablePose(name, f"the grid {grid}", f"none of {grid.size} is")
         spots = _spots(mapper, grid, draft, tally, seed)
         before = draft.tally.done
         draft.finish()
     return SweptErrors(grid, Path(path), tally, spots, before)
 
 
-def _spots(mapper: Mapper, grid: Grid, draft: _SweepDraft, tally: Tally, seed: int) -> Spots:
+def _spots(mapper: Mapper, grid: Grid, draft: _SweepDraft, tally: Tally, seed: int) -> SpotChecks:
     """The file held against Pinocchio at random poses of it; where few of these are reached, of the part that is
     reached most."""
     rng = np.random.default_rng(seed)
@@ -121,7 +121,7 @@ def _spots(mapper: Mapper, grid: Grid, draft: _SweepDraft, tally: Tally, seed: i
         if reached.sum() >= SPOTS:
             break
     position, orientation = rows.T
-    seen = Seen(reached, position, orientation, lambda: None, lambda: position, tally.gap)
+    seen = ErrorField(reached, position, orientation, lambda: None, lambda: position, tally.gap)
     return mapper.spots(grid, seen, seed, cells=cells)
 
 

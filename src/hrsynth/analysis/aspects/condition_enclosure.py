@@ -151,7 +151,7 @@ def is_beyond(enclosure: ConditionEnclosure, p: Array, R: Array) -> bool:
     known = limbs_of(tuple(forms.vectors.values()))
     forms = replace(forms, bounds=tuple(bound for bound in forms.bounds if limbs_of(bound) <= known))
     margins = forms.at(*StraightSegment(p, R, np.zeros(3), np.zeros(3)).at(balls([0.0], [0.0]))).reach_margins
-    return bool(above_zero(-margins[:, len(forms.limbs) :]).any())
+    return bool(above_zero(-margins[:, len(forms.subchains) :]).any())
 
 
 def _weakest(values: dict[str, Field], condition: Named) -> float:

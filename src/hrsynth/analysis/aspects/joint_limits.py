@@ -73,7 +73,7 @@ JointLimit = TurnLimit | SlideLimit
 
 def bounds(sight: SampledMechanism, source: Callable[..., VectorExpression]) -> Iterator[JointLimit]:
     """The limits of joints that can be told from the pose."""
-    for name, (lower, upper) in sight.mechanism.limited.items():
+    for name, (lower, upper) in sight.mechanism.joint_ranges.items():
         if not -np.inf < lower < upper < np.inf:
             continue
         joint = sight.mechanism.joints[name]
@@ -85,11 +85,11 @@ def bounds(sight: SampledMechanism, source: Callable[..., VectorExpression]) -> 
 def _bound(
     sight: SampledMechanism, source: Callable[..., VectorExpression], joint: Joint, middle: float, half: float
 ) -> JointLimit | None:
-    twin = sight.configurations[0].twin
-    (place,) = twin.coordinates[joint.name] if joint.type.freedoms == 1 else (None,)
+    model = sight.configurations[0].model
+    (place,) = model.coordinates[joint.name] if joint.type.freedoms == 1 else (None,)
     if place is None:
         return None
-    coordinates = np.array([twin.difference(twin.q0, at.q)[place] for at in sight.configurations])
+    coordinates = np.array([model.difference(model.q0, at.q)[place] for at in sight.configurations])
     known = _Known(sight, source)
     axis = known.source(axis_of(sight.mechanism, joint, "a"))
     if axis is None:

@@ -36,7 +36,7 @@ class LegStates:
 class LegForms:
     """Closed forms of all legs in their working modes, and how the condition's vectors follow from them."""
 
-    limbs: tuple[ClosedFormLeg, ...]
+    subchains: tuple[ClosedFormLeg, ...]
     vectors: Mapping[str, VectorExpression]
     points: tuple[str, ...] = ()
     """Symbols of points; the first is where they are measured from."""
@@ -46,16 +46,16 @@ class LegForms:
     @property
     def modes(self) -> tuple[float, ...]:
         """The working mode of each limb, ±1."""
-        return tuple(limb.mode for limb in self.limbs)
+        return tuple(limb.mode for limb in self.subchains)
 
     def flipped(self, limb: int) -> LegForms:
         """The same with one limb in its other working mode."""
-        other = replace(self.limbs[limb], mode=-self.limbs[limb].mode)
-        return replace(self, limbs=(*self.limbs[:limb], other, *self.limbs[limb + 1 :]))
+        other = replace(self.subchains[limb], mode=-self.subchains[limb].mode)
+        return replace(self, subchains=(*self.subchains[:limb], other, *self.subchains[limb + 1 :]))
 
     def beyond(self, p: Array, R: Array) -> tuple[str, ...]:
         """The joints that are not within their limits at one pose (3,), (3, 3)."""
-        within = self.at(p[None], R[None]).reach_margins[0, len(self.limbs) :][: len(self.bounds)] > 0
+        within = self.at(p[None], R[None]).reach_margins[0, len(self.subchains) :][: len(self.bounds)] > 0
         return tuple(bound.joint for bound, held in zip(self.bounds, within, strict=True) if not held)
 
     def at(self, p: Field, R: Field, leading: tuple[int, Field] | None = None) -> LegStates:
@@ -65,7 +65,7 @@ class LegForms:
                 (0 * p[:, 0] + 1.0, leading[1])
                 if leading is not None and leading[0] == number
                 else limb.solve(limb.tip.value(p, R), limb.mode)
-                for number, limb in enumerate(self.limbs)
+                for number, limb in enumerate(self.subchains)
             ]
             carried = [vector for _, vector in solved]
             values = {symbol: value_of(each, p, R, carried) for symbol, each in self.vectors.items()}
@@ -80,7 +80,7 @@ class LegPattern:
     """Closed forms without a working mode, the vector that each carries, and how the wanted vectors follow."""
 
     coordinates: PathCoordinates
-    limbs: tuple[ClosedFormLeg, ...]
+    subchains: tuple[ClosedFormLeg, ...]
     carried: tuple[NamedVector, ...]
     vectors: Mapping[str, VectorExpression]
     points: tuple[str, ...]
@@ -93,7 +93,7 @@ class LegPattern:
     def fitted(self) -> tuple[str, ...]:
         """What was fitted to samples and not read from the joints: legs, and vectors by their symbols; and the legs
         whose inner loops are closed at samples alone."""
-        legs = dict.fromkeys(f"leg {limb.label}" for limb in self.limbs if limb.fitted)
+        legs = dict.fromkeys(f"leg {limb.label}" for limb in self.subchains if limb.fitted)
         loops = (f"the loops inside leg {label}" for label in self.loose)
         return (*legs, *(symbol for symbol, source in self.vectors.items() if source.fitted), *loops)
 
@@ -101,7 +101,7 @@ class LegPattern:
         """The forms in a configuration's working mode; raises ``NoLegForm`` where a leg does not follow its form."""
         p, R = self.coordinates.of([at])
         limbs = []
-        for limb, feature in zip(self.limbs, self.carried, strict=True):
+        for limb, feature in zip(self.subchains, self.carried, strict=True):
             tip = limb.tip.value(p, R)
             actual = feature.value(poses_at([at], feature.links))
             mode = limb.modes(tip, actual)
@@ -112,24 +112,24 @@ class LegPattern:
 
 
 def pattern(
-    anatomy: LegDecomposition,
+    decomposition: LegDecomposition,
     features: Sequence[NamedVector],
     coordinates: PathCoordinates,
     configurations: Sequence[ClosedConfiguration],
 ) -> LegPattern:
     """The forms of all legs and of the wanted features; raises ``NoLegForm`` where one fits none."""
-    rules = JointRules.of(anatomy, coordinates, configurations)
-    sight = SampledMechanism(anatomy.mechanism, coordinates, configurations, rules)
+    rules = JointRules.of(decomposition, coordinates, configurations)
+    sight = SampledMechanism(decomposition.mechanism, coordinates, configurations, rules)
     found: list[tuple[ClosedFormLeg, NamedVector]] = []
-    for leg in anatomy.legs:
-        if len(leg.joints) == 1 and anatomy.mechanism.joints[leg.joints[0]].type.freedoms == 6:
+    for leg in decomposition.legs:
+        if len(leg.joints) == 1 and decomposition.mechanism.joints[leg.joints[0]].type.freedoms == 6:
             continue
-        of_leg = list(sight.limbs(leg))
+        of_leg = list(sight.subchains(leg))
         if not of_leg:
             raise NoLegForm(f"leg {leg.label} is neither a rod on a crank or rail nor a rod that slides")
         found += of_leg
     limbs, carried = (tuple(part) for part in zip(*found, strict=True)) if found else ((), ())
-    loose = tuple(leg.label for leg in anatomy.legs if not sight.closes(leg, carried))
+    loose = tuple(leg.label for leg in decomposition.legs if not sight.closes(leg, carried))
     vectors = {f.symbol: sight.source(f, carried) for f in features}
     points = tuple(f.symbol for f in features if isinstance(f, BodyPoint))
     kept = tuple(bounds(sight, lambda feature: sight.source(feature, carried)))

@@ -14,28 +14,28 @@ from ...constraints.condition import Condition, Named
 from ...constraints.pattern import ConstraintPattern
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.continuation import lead_to, track
 from ...kinematics.joint_coordinates import OfConfiguration
 from ...kinematics.platform_motion import PlatformMotion
-from ...kinematics.steps import lead_to, track
 from ...mechanism.observation import Observation
 from ...mechanism.pose import AskedPose, Pose, PoseLike, asked_pose
 from ...options import option
-from ...progress import tell
+from ...progress import report
 from ...records import As, Recorded, Shown, recorded
 from ...results import Result, Value
 from ...tolerances import AS_PRINTED, RANK_CUTOFF, RANK_GAP, SOLVED
-from ..accuracy.cones import unseen
-from ..asked import configurations_at
+from ..accuracy.measurement_bounds import unseen
+from ..analysis_declaration import analysis
 from ..measured import MeasuredRobot
 from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SeeLike, StartPose
-from ..question import analysis
-from ..singularity.agreement import smallest_of, weakest
+from ..pose_requests import configurations_at
+from ..singularity.condition_check import smallest_of, weakest
 from .condition_enclosure import ConditionEnclosure, PathSegment, enclose_value, is_beyond, sign_of
 from .leg_forms import LegForms, LegPattern, pattern
 from .path_segments import PathCoordinates, Place, WorkingModeChange, path_coordinates
-from .road_map import PlannedPath, PoseRegion, plan
+from .roadmap import PlannedPath, PoseRegion, plan
 from .vector_expressions import NoLegForm, limbs_of
-from .words import SAME, SEPARATED, UNDECIDED
+from .verdicts import SAME, SEPARATED, UNDECIDED
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,7 +49,7 @@ class PathEnd(OfConfiguration, Value):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SampledRoad(Value, all_recorded=True):
+class SampledRoute(Value, all_recorded=True):
     """The condition at ``count`` poses on the straight path between two poses: the smallest |value|, and ``at`` which
     pose; how often its sign changes from one to the next (None for a value without sign); the part of the path that was
     ``reached``, and what was first seen not to be in front of its camera. Nothing is known between the poses."""
@@ -59,7 +59,7 @@ class SampledRoad(Value, all_recorded=True):
     at: Pose
     changes: int | None
     reached: float
-    lost: Annotated[str | None, As("lost_from_sight")]
+    out_of_view: Annotated[str | None, As("lost_from_sight")]
 
 
 class Crossing(NamedTuple):
@@ -79,7 +79,7 @@ class PathAnswer(Result, shown_as="path"):
     they are separated; ``boxes`` are the intervals of all proofs tried.
     """
 
-    setting: ObservedRobot
+    setup: ObservedRobot
     verdict: Annotated[str, Literal["same aspect", "separated", "undecided"]]
     certified: Recorded[bool]
     poses: Annotated[tuple[Pose, ...], As("path")]
@@ -90,55 +90,55 @@ class PathAnswer(Result, shown_as="path"):
     reason: Recorded[str]
     signed: bool
     coordinates: PathCoordinates | None = None
-    ways: tuple[PathSegment, ...] = ()
+    segments: tuple[PathSegment, ...] = ()
     limits: Recorded[tuple[str, ...]] = ()
     """Joints whose limits hold all along a certified path."""
-    unlimited: tuple[str, ...] = ()
+    limits_ignored: tuple[str, ...] = ()
     """Joints whose limits are not considered."""
     any_mode: bool = False
     """Whether the goal is a pose, whatever the working modes of its legs, and not a configuration."""
     goal_modes: tuple[tuple[float, ...], ...] = ()
     """Working modes of all limbs at the goal in which the sign is proved to be opposite to the start's, where they are
     separated."""
-    road: Annotated[SampledRoad | None, As("sampled")] = None
+    road: Annotated[SampledRoute | None, As("sampled")] = None
     """The straight way, sampled; where neither a path nor a separation was enclosed."""
 
     def headline(self) -> str:
         """The robot and the verdict."""
-        return f"{self.setting.headline()}: {self.verdict}"
+        return f"{self.setup.headline()}: {self.verdict}"
 
     @property
     def stays(self) -> bool:
         """Whether start and goal are one pose of the platform, to the digits printed."""
-        one, other = (at.pose(self.setting.motion.link) for at in (self.start.configuration, self.goal.configuration))
+        one, other = (at.pose(self.setup.motion.link) for at in (self.start.configuration, self.goal.configuration))
         return bool(np.max(np.abs(one - other)) <= AS_PRINTED)
 
     @property
     @recorded(As("not_considered"))
     def not_proved(self) -> str:
         """What a certificate says nothing about."""
-        joints = f"limits of joints {', '.join(self.unlimited)}; " if self.unlimited else ""
-        if not all(o.by_segment for o in self.setting.observed):
+        joints = f"limits of joints {', '.join(self.limits_ignored)}; " if self.limits_ignored else ""
+        if not all(o.by_segment for o in self.setup.observed):
             joints += "what is behind a camera or out of its picture; "
         return f"{joints}collisions and constraint singularities of the loops are not considered"
 
     @property
     def where(self) -> str:
         """Which paths are meant: on which what is observed has a value (no point is in a camera's centre)."""
-        return "" if all(o.by_segment for o in self.setting.observed) else "on which all that is observed has a value "
+        return "" if all(o.by_segment for o in self.setup.observed) else "on which all that is observed has a value "
 
     @property
     @recorded()
     def crossings(self) -> tuple[Crossing, ...]:
         """The legs that change their working mode, each with the place of its limit in ``poses``."""
         found, place = [], 0
-        for way in self.ways:
+        for way in self.segments:
             if isinstance(way, WorkingModeChange):
                 found.append(Crossing(way.leg, place + 1))
             place += len(_marks(way))
         return tuple(found)
 
-    observed = Shown(tuple[Observation, ...], lambda self: self.setting.observed)
+    observed = Shown(tuple[Observation, ...], lambda self: self.setup.observed)
     point = Shown(list[float] | None, lambda self: None if self.coordinates is None else self.coordinates.motion.point)
     value = Shown(
         Literal["expression", "smallest singular value"],
@@ -184,10 +184,10 @@ CLEAR = RANK_CUTOFF * RANK_GAP
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Aspects(Value):
+class PathPlanner(Value):
     """A robot with its Type 2 condition, ready to be asked for paths between configurations."""
 
-    setting: ObservedRobot
+    setup: ObservedRobot
     motion: PlatformMotion
     structure: ConstraintPattern
     condition: Condition
@@ -203,18 +203,18 @@ class Aspects(Value):
         *,
         see: SeeLike = None,
         seed: int = 0,
-    ) -> Aspects:
+    ) -> PathPlanner:
         """The condition of a robot from random samples of its motion."""
-        setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
-        seen = MeasuredRobot.of_directions(setting)
+        setup = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
+        seen = MeasuredRobot.of_directions(setup)
         return cls(
-            setting, setting.motion, seen.pattern, seen.condition, seen.verdict.never if seen.verdict.lost else ""
+            setup, setup.motion, seen.pattern, seen.condition, seen.verdict.never if seen.verdict.unobserved else ""
         )
 
     @property
     def members(self) -> list[ClosedConfiguration]:
         """The zero configuration and the samples."""
-        return [self.setting.everything.start, *self.setting.configurations]
+        return [self.setup.all_samples.start, *self.setup.configurations]
 
     @cached_property
     def pattern(self) -> LegPattern | str:
@@ -225,15 +225,15 @@ class Aspects(Value):
         features = [f for f in self.structure.features if not sign_of(self.condition) or f.symbol in used]
         many = self.motion.translations.shape[1] + self.motion.rotations.shape[1]
         reason = (
-            f"the {many} parts of the platform's pose that change depend on each other, {self.setting.dof} are "
+            f"the {many} parts of the platform's pose that change depend on each other, {self.setup.dof} are "
             "free: ways that move a point straight and turn about one axis do not keep to the others"
         )
-        if many == self.setting.dof:
+        if many == self.setup.dof:
             reason = "the platform has other freedoms at the zero configuration than elsewhere"
-        question = self.setting.samples.question
-        for each in path_coordinates(self.setting.anatomy, question, self.setting.dof, self.members):
+        observation_model = self.setup.samples.observation_model
+        for each in path_coordinates(self.setup.decomposition, observation_model, self.setup.dof, self.members):
             try:
-                return pattern(self.setting.anatomy, features, each, self.members)
+                return pattern(self.setup.decomposition, features, each, self.members)
             except NoLegForm as why:
                 reason = str(why)
         return reason
@@ -262,7 +262,7 @@ class Aspects(Value):
             for at, value in zip((start, goal), values, strict=True)
         ]
         answer = PathAnswer(
-            self.setting,
+            self.setup,
             UNDECIDED,
             False,
             tuple(end.pose for end in ends),
@@ -279,7 +279,7 @@ class Aspects(Value):
         if min(abs(end.value) for end in ends) < CLEAR:
             least = min(ends, key=lambda end: abs(end.value))
             told = "a pose lies on the singular locus, or too near to it to be distinguished"
-            if abs(least.value) < SOLVED and weakest(least.configuration, self.setting.samples.question) > CLEAR:
+            if abs(least.value) < SOLVED and weakest(least.configuration, self.setup.samples.observation_model) > CLEAR:
                 told = "the condition vanishes where no freedom is lost: it is not this robot's"
             return replace(answer, reason=told)
         try:
@@ -289,9 +289,9 @@ class Aspects(Value):
             return answer if answer.verdict == SEPARATED else replace(answer, road=self.road(start, goal))
         return self._decide(answer, enclosures, seed, budget)
 
-    def road(self, start: ClosedConfiguration, goal: ClosedConfiguration) -> SampledRoad:
+    def road(self, start: ClosedConfiguration, goal: ClosedConfiguration) -> SampledRoute:
         """The straight way of the platform from a configuration to the pose of another, sampled."""
-        motion, question = self.motion, self.setting.samples.question
+        motion, observation_model = self.motion, self.setup.samples.observation_model
         target, X = motion.whole(goal.pose(motion.link)), start.pose(motion.link)
         way = [start]
         fractions = np.linspace(0, 1, SAMPLES)
@@ -304,8 +304,8 @@ class Aspects(Value):
         values = self.condition.evaluate(scene) if self.condition.signed else smallest_of(self.condition.rows(scene))
         worst = int(np.argmin(np.abs(values)))
         changes = int(np.sum(values[1:] * values[:-1] < 0)) if self.condition.signed else None
-        lost = next((f"{o.kind} {o.leg}" for at in way if (o := unseen(at, question)) is not None), None)
-        return SampledRoad(
+        lost = next((f"{o.kind} {o.leg}" for at in way if (o := unseen(at, observation_model)) is not None), None)
+        return SampledRoute(
             len(way),
             float(abs(values[worst])),
             motion.pose(way[worst].pose(motion.link)),
@@ -328,7 +328,7 @@ class Aspects(Value):
         if not all(sure) or margin == 0:
             return replace(answer, reason="at a pose reach or value cannot be enclosed away from zero")
         if enclosures[0].signed and values[0] * values[1] < 0:
-            seen = () if answer.any_mode else {o.leg for o in self.setting.observed}
+            seen = () if answer.any_mode else {o.leg for o in self.setup.observed}
             across, others, margin = self._across(enclosures[1], (p[1], R[1]), values, seen)
             if not others:
                 return replace(
@@ -354,7 +354,7 @@ class Aspects(Value):
         """Of the working modes of the goal, of legs that are not ``seen``: those in which the value's sign is proved to
         be opposite to the start's; those in which it is not, nor a joint proved to be beyond its limits, first those
         nearest to the goal's; and the smallest |value| at the start and in the former."""
-        limbs, across, others, margin = goal.forms.limbs, [goal.forms.modes], [], min(map(abs, values))
+        limbs, across, others, margin = goal.forms.subchains, [goal.forms.modes], [], min(map(abs, values))
         able = [k for k in sorted(limbs_of(tuple(goal.forms.vectors.values()))) if limbs[k].label not in seen]
         for k in range(1, len(able) + 1):
             for part in combinations(able, k):
@@ -377,9 +377,11 @@ class Aspects(Value):
         budget: int,
     ) -> PathAnswer:
         """A path to the goal in a working mode in which its sign is the start's; ``undecided`` if none is found."""
-        spent, limbs = 0, self.enclosure(answer.goal.configuration).forms.limbs
+        spent, limbs = 0, self.enclosure(answer.goal.configuration).forms.subchains
         for there in others:
-            legs = [one.label for one, other in zip(limbs, there.forms.limbs, strict=True) if one.mode != other.mode]
+            legs = [
+                one.label for one, other in zip(limbs, there.forms.subchains, strict=True) if one.mode != other.mode
+            ]
             (p, R), modes = poses, f"in the other working mode of leg {', '.join(dict.fromkeys(legs))}"
             if spent < budget and there.at(p[1:2], R[1:2])[1][0] * answer.start.value > 0:
                 found = self._lead(answer, (start, there), poses, seed, budget - spent)
@@ -395,7 +397,7 @@ class Aspects(Value):
         able = dict.fromkeys(
             one.label
             for there in others
-            for one, other in zip(limbs, there.forms.limbs, strict=True)
+            for one, other in zip(limbs, there.forms.subchains, strict=True)
             if one.mode != other.mode
         )
         return replace(
@@ -456,15 +458,15 @@ class Aspects(Value):
             answer,
             boxes=found.boxes,
             limits=kept,
-            unlimited=(
-                *(name for name in self.setting.robot.limited if name not in kept),
-                *self.setting.mechanism.wrists,
+            limits_ignored=(
+                *(name for name in self.setup.robot.joint_ranges if name not in kept),
+                *self.setup.mechanism.tilt_limits,
             ),
         )
         if not found.ways:
             return answer
         poses = answer.start.pose, *between(answer, known.coordinates, found.ways), answer.goal.pose
-        return replace(answer, coordinates=known.coordinates, ways=found.ways, poses=poses)
+        return replace(answer, coordinates=known.coordinates, segments=found.ways, poses=poses)
 
 
 @analysis(
@@ -508,17 +510,17 @@ def path(
     <PathAnswer: 3rrr_m1, watching 1, 2, 3: same aspect>
     """
     wanted = [asked_pose(each) for each in (start, goal)]
-    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
-    return between_poses(setting, wanted, any_mode=isinstance(wanted[1], Pose), seed=seed, budget=budget)
+    setup = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
+    return between_poses(setup, wanted, any_mode=isinstance(wanted[1], Pose), seed=seed, budget=budget)
 
 
 def between_poses(
-    setting: ObservedRobot, wanted: Sequence[AskedPose], *, any_mode: bool, seed: int = 0, budget: int = BUDGET
+    setup: ObservedRobot, wanted: Sequence[AskedPose], *, any_mode: bool, seed: int = 0, budget: int = BUDGET
 ) -> PathAnswer:
     """What :meth:`Aspects.join` says of the configurations at a start and a goal."""
-    aspects = Aspects.of(setting.telling(wanted), seed=seed)
-    tell("poses")
-    first, last = configurations_at(aspects.setting, wanted, by_modes=True)
+    aspects = PathPlanner.of(setup.telling(wanted), seed=seed)
+    report("poses")
+    first, last = configurations_at(aspects.setup, wanted, by_modes=True)
     return aspects.join(first, last, seed=seed, budget=budget, any_mode=any_mode)
 
 
@@ -543,7 +545,7 @@ def _why_undecided(found: PlannedPath, enclosures: Sequence[ConditionEnclosure],
     used = "the number of intervals is used up" if found.boxes >= budget else "the road map does not join the poses"
     if found.ways:
         return f"no path was proved: {used}; the path shown is proved except for its last part"
-    pairs = zip(*(enclosure.forms.limbs for enclosure in enclosures), strict=True)
+    pairs = zip(*(enclosure.forms.subchains for enclosure in enclosures), strict=True)
     legs = dict.fromkeys(one.label for one, other in pairs if one.mode != other.mode)
     return f"no path was proved: {used}; leg {', '.join(legs)} is in different working modes at the two poses"
 

@@ -20,7 +20,7 @@ from ...geometry.so3 import exponential, logarithm
 from ...geometry.vectors import Array, cross, hat, inverse
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
-from ...kinematics.relation import Measurement, relation
+from ...kinematics.velocity_relation import ObservationModel, relation
 from ...mechanism.legs import LegDecomposition
 from ...results import Value
 from ...tolerances import FOLLOWED
@@ -53,21 +53,24 @@ class PathCoordinates(Value):
 
 
 def path_coordinates(
-    anatomy: LegDecomposition, question: Measurement, dof: int, configurations: Sequence[ClosedConfiguration]
+    decomposition: LegDecomposition,
+    observation_model: ObservationModel,
+    dof: int,
+    configurations: Sequence[ClosedConfiguration],
 ) -> Iterator[PathCoordinates]:
     """The whole pose of the platform where its parts are independent, then the positions of joint centres on it that
     have all of the robot's freedoms."""
-    mechanism = anatomy.mechanism
+    mechanism = decomposition.mechanism
     X_PB = inverse(mechanism.links[mechanism.platform].pose)
     centres = [(X_PB @ np.append(joint.point, 1.0))[:3] for joint in mechanism.joints_of(mechanism.platform)]
-    for point in (question.point, *centres):
-        asked = replace(question, point=point, observations=())
+    for point in (observation_model.point, *centres):
+        asked = replace(observation_model, point=point, observations=())
         if any(relation(at, asked).dof.value != dof for at in configurations):
             continue
         motion = PlatformMotion.of(configurations, asked)
         shifts, spins = motion.translations.shape[1], motion.rotations.shape[1]
         if motion.twists.shape[1] == shifts + spins == dof and spins in (0, 1, 3):
-            yield PathCoordinates(motion, motion.body, configurations[0].twin.length)
+            yield PathCoordinates(motion, motion.body, configurations[0].model.length)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

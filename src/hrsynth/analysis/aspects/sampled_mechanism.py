@@ -97,7 +97,7 @@ class SampledMechanism:
             return found
         return platform_point(values, *places)
 
-    def limbs(self, leg: Leg) -> Iterator[tuple[ClosedFormLeg, NamedVector]]:
+    def subchains(self, leg: Leg) -> Iterator[tuple[ClosedFormLeg, NamedVector]]:
         """The rods of a leg with the vectors that they carry, each equation once; else its sliding rod."""
         seen: list[tuple[Array, Array]] = []
         for tip, spot in self.tips(leg):

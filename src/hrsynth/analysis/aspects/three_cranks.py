@@ -16,7 +16,7 @@ from ...geometry.vectors import Array, perpendicular
 from ...kinematics.configuration import ClosedConfiguration, measure
 from ...tolerances import SAME_RELATION
 from .leg_forms import LegPattern
-from .path import Aspects
+from .path import PathPlanner
 
 Complex = NDArray[np.complex128]
 
@@ -44,21 +44,21 @@ class CrankPlace:
 
 
 def three_cranks(
-    aspects: Aspects, configurations: Sequence[ClosedConfiguration]
+    aspects: PathPlanner, configurations: Sequence[ClosedConfiguration]
 ) -> tuple[ThreeCranks, list[CrankPlace]] | str:
     """The robot in its plane, legs in the order in which they are watched, the first configuration being the goal; and
     where it is at each of them. Or why it is no such robot."""
-    setting, pattern = aspects.setting, aspects.pattern
+    setup, pattern = aspects.setup, aspects.pattern
     if aspects.structure.motion != "planar" or not isinstance(pattern, LegPattern):
         return "the platform and its legs do not move in a plane, or have no closed forms"
-    labels = [o.leg for o in setting.observed]
-    if (len(labels), len(set(labels))) != (3, 3) or setting.mechanism.reference != setting.mechanism.base:
+    labels = [o.leg for o in setup.observed]
+    if (len(labels), len(set(labels))) != (3, 3) or setup.mechanism.reference != setup.mechanism.base:
         return "not three legs, one direction of each, are watched from the base"
-    limbs = {limb.label: (k, limb) for k, limb in enumerate(pattern.limbs)}
+    limbs = {limb.label: (k, limb) for k, limb in enumerate(pattern.subchains)}
     chosen = [(k, limb) for k, limb in (limbs[label] for label in labels) if isinstance(limb, OnCrank)]
-    if not len(pattern.limbs) == len(chosen) == 3:
+    if not len(pattern.subchains) == len(chosen) == 3:
         return "the legs are not three rods on cranks"
-    normal = setting.motion.normal
+    normal = setup.motion.normal
     x = perpendicular(normal)
     plane = np.array([x, np.cross(normal, x)]).T @ [1, 1j]
     feet = np.array([limb.centre for _, limb in chosen])
@@ -67,8 +67,10 @@ def three_cranks(
     for at in configurations:
         (p, R), forms = pattern.coordinates.of([at]), aspects.enclosure(at).forms
         corners = np.array([limb.tip.value(p, R)[0] for _, limb in chosen])
-        ends = np.array([forms.limbs[k].solve(limb.tip.value(p, R), forms.limbs[k].mode)[1][0] for k, limb in chosen])
-        seen = measure(at.twin, at.q, setting.mechanism.base, setting.observed)[2]
+        ends = np.array(
+            [forms.subchains[k].solve(limb.tip.value(p, R), forms.subchains[k].mode)[1][0] for k, limb in chosen]
+        )
+        seen = measure(at.model, at.q, setup.mechanism.base, setup.observed)[2]
         rods = corners - ends
         across = np.linalg.norm(np.cross(rods, seen), axis=1) / np.linalg.norm(rods, axis=1)
         if np.max(across) > SAME_RELATION:

@@ -127,11 +127,14 @@ class JointRules:
 
     @classmethod
     def of(
-        cls, anatomy: LegDecomposition, coordinates: PathCoordinates, configurations: Sequence[ClosedConfiguration]
+        cls,
+        decomposition: LegDecomposition,
+        coordinates: PathCoordinates,
+        configurations: Sequence[ClosedConfiguration],
     ) -> JointRules:
         """The base, and the platform's links from joint to joint. Which of these turn is seen at configurations; that
         the joints between them allow it follows from the joints."""
-        mechanism, length, link = anatomy.mechanism, coordinates.length, coordinates.motion.link
+        mechanism, length, link = decomposition.mechanism, coordinates.length, coordinates.motion.link
         frame = mechanism.links[link].pose
         anchor = (frame[:3, :3] @ coordinates.motion.point + frame[:3, 3]) / length
         bodies = {mechanism.base: CarriedLink(PlatformPoint(False, np.zeros(3), np.zeros(3)), np.zeros(3), False)}
@@ -141,7 +144,7 @@ class JointRules:
         for one in reached:
             for joint in mechanism.joints_of(one):
                 other = joint.other(one)
-                if other in anatomy.platform and other not in bodies and _points(joint):
+                if other in decomposition.platform and other not in bodies and _points(joint):
                     rule = known.point(one, joint.point / length)
                     if rule is not None:
                         turns = _turns(mechanism, other, coordinates, configurations)

@@ -34,7 +34,9 @@ class BranchCell(Value, all_recorded=True):
     centre: Annotated[Array, list[float]]
     slopes: Annotated[Array, Table, "one row per passive coordinate, one column per motor"]
     radius: Annotated[Array, list[float]]
-    weakest: Annotated[float, "a lower bound of the smallest singular value of the loops' Jacobian over the tube"]
+    smallest_singular_value: Annotated[
+        float, "a lower bound of the smallest singular value of the loops' Jacobian over the tube"
+    ]
     neighbours: Annotated[tuple[int, ...], "cells with a common face, proved to hold the same closure there"] = ()
 
     @property
@@ -95,12 +97,12 @@ class BranchPart(Value):
     passive: Recorded[tuple[str, ...]]
     q0: Annotated[Array, list[float]]
     x0: Annotated[Array, list[float]]
-    asked: Annotated[tuple[Array, Array], Table, "low and high of the requested box"]
+    requested_box: Annotated[tuple[Array, Array], Table, "low and high of the requested box"]
     proved: Annotated[
         tuple[Array, Array], Table, "low and high of a box about the zero configuration in the union of the cells"
     ]
-    share: Annotated[float, "volume of all cells, as a share of the box"]
-    box_share: Recorded[float]
+    volume_fraction: Annotated[float, "volume of all cells, as a share of the box"]
+    box_fraction: Recorded[float]
     cells: Recorded[tuple[BranchCell, ...]]
     toggles: Recorded[tuple[Toggle, ...]]
     turns: tuple[tuple[str, bool], ...]
@@ -117,7 +119,7 @@ class BranchPart(Value):
     @property
     def percent(self) -> str:
         """The share in per cent, never rounded up to all of it."""
-        return "100" if self.share == 1.0 else f"{min(100 * self.share, 99.9):.3g}"
+        return "100" if self.volume_fraction == 1.0 else f"{min(100 * self.volume_fraction, 99.9):.3g}"
 
     def place(self, q: Array) -> str:
         """Motor coordinates (n,) in words."""
@@ -158,9 +160,9 @@ class BranchProof(Result, shown_as="branch"):
     system: LoopSystem
     motors: Recorded[tuple[str, ...]]
     passive: Recorded[tuple[str, ...]]
-    held: Recorded[tuple[str, ...]]
+    fixed: Recorded[tuple[str, ...]]
     parts: Recorded[tuple[BranchPart, ...]]
-    back: Annotated[tuple[Array, Array] | None, Table | None, f"{BACK}, or null"]
+    injective_box: Annotated[tuple[Array, Array] | None, Table | None, f"{BACK}, or null"]
     """A box of all motors (m, rad), low and high (n,) each, about the zero configuration, in which no two are proved to
     give the platform one pose; None where there is no proof."""
     regular: Annotated[bool, "whether the proved box has no Type 1 singularity (proved)"]
@@ -173,16 +175,16 @@ class BranchProof(Result, shown_as="branch"):
     """The limits of joints without a motor."""
 
     @property
-    def setting(self) -> Mechanism:
+    def setup(self) -> Mechanism:
         """The robot: what is compared besides the record."""
         return self.robot
 
     @property
-    def held_at(self) -> dict[str, float]:
+    def fixed_at(self) -> dict[str, float]:
         """Where the idle coordinates are held (m, rad)."""
         system = self.system
         every = dict(zip(system.names, (system.zero * system.units).tolist(), strict=True))
-        return {name: every[name] for name in self.held}
+        return {name: every[name] for name in self.fixed}
 
     @property
     def proved(self) -> tuple[Array, Array]:

@@ -24,8 +24,8 @@ from ...budgets import TUBE_RADII, TUBE_WIDER
 from ...geometry.affine import AffineForms, affine, combine, dot_product, stack
 from ...geometry.vectors import Array, times
 from ...tolerances import AFFINE_ROUNDING, THINNEST_CELL, THINNEST_TUBE
-from .loops import GearEquation, JointLoop, LoopRow, residuals, rod_ends
-from .part import LoopBlock, LoopEquation, LoopPart
+from .loop_parts import LoopBlock, LoopEquation, LoopPart
+from .loops import CouplingEquation, JointLoop, LoopRow, residuals, rod_ends
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,7 +244,7 @@ def evaluate_equations(
     slopes: list[dict[int, Any]] = [{} for _ in equations]
     groups: dict[int, list[int]] = {}
     for k, each in enumerate(equations):
-        if isinstance(each.of, GearEquation):
+        if isinstance(each.of, CouplingEquation):
             for i, rate in ((each.of.second, 1.0), (each.of.first, -each.of.ratio)):
                 form = forms[i]
                 if form is not None:

@@ -11,7 +11,7 @@ from ...tolerances import AFFINE_ROUNDING, TOGGLE, TOGGLE_JOINT
 from .answer import Toggle
 from .cells import BranchTube, prove_all
 from .growth import BranchEnd, Growth
-from .part import LoopPart
+from .loop_parts import LoopPart
 
 HALVINGS = 40
 """How often the way to a toggle is halved."""

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from ...budgets import FINEST_BRANCH_CELL
 from ...geometry.vectors import Array
-from ...progress import tell
+from ...progress import report
 from ...tolerances import AFFINE_ROUNDING
 from .cells import BranchTube, middles, prove_all
-from .part import LoopPart
+from .loop_parts import LoopPart
 
 AT_ONCE = 64
 """Cells that are tried together."""
@@ -142,7 +142,7 @@ class Growth:
                 waiting += [half for each in coarse for half in self._cut(*each)]
                 continue
             self.tried += len(batch)
-            tell("batches of cells")
+            report("batches of cells")
             tubes = self._tubes(batch)
             joined = self._join(batch, tubes)
             for (leaf, q, x), tube in zip(batch, tubes, strict=True):

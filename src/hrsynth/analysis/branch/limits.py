@@ -20,7 +20,7 @@ def branch_limits(
 ) -> Iterator[BranchLimit]:
     """The limits of all joints without a motor, in the order of the file, with what the proved cells say of them."""
     for name in robot.joints:
-        if name in robot.wrists:
+        if name in robot.tilt_limits:
             yield BranchLimit(name, None, None, None, None, UNSEEN)
         if name in motors or name not in robot.filed:
             continue

@@ -90,7 +90,7 @@ class JointLoop(Value):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class GearEquation(Value):
+class CouplingEquation(Value):
     """A coupling: coordinate ``second`` − ``ratio`` · coordinate ``first``, each from the zero configuration, = 0
     (characteristic lengths, radians)."""
 
@@ -110,7 +110,7 @@ class LoopSystem(Value):
     coordinates: tuple[TreeCoordinate, ...]
     body: Mapping[str, int]
     loops: tuple[JointLoop, ...]
-    gears: tuple[GearEquation, ...]
+    gears: tuple[CouplingEquation, ...]
 
     @property
     def units(self) -> Array:
@@ -446,7 +446,7 @@ def parts(joint: Joint) -> list[tuple[str, bool, Array]]:
     ]
 
 
-def _gears(mechanism: Mechanism, coordinates: Sequence[TreeCoordinate], length: float) -> tuple[GearEquation, ...]:
+def _gears(mechanism: Mechanism, coordinates: Sequence[TreeCoordinate], length: float) -> tuple[CouplingEquation, ...]:
     found = []
     for coupling in mechanism.couplings:
         pair = []
@@ -460,7 +460,7 @@ def _gears(mechanism: Mechanism, coordinates: Sequence[TreeCoordinate], length: 
             pair.append(places[0])
         first, second = pair
         scale = [length if coordinates[i].slides else 1.0 for i in pair]
-        found.append(GearEquation(coupling.name, first, second, coupling.ratio * scale[0] / scale[1]))
+        found.append(CouplingEquation(coupling.name, first, second, coupling.ratio * scale[0] / scale[1]))
     return tuple(found)
 
 

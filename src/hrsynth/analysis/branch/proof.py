@@ -8,23 +8,23 @@ from typing import Annotated
 import numpy as np
 
 from ...budgets import BRANCH_CELLS, BRANCH_DEPTH, COARSEST_BRANCH_CELL, WIDEST_BRANCH_BOX
-from ...description.assembly.zero import at_file_zero
+from ...description.assembly.zero_configuration import at_file_zero
 from ...errors import BadMechanism, BadRequest, LoopsNotClosed
 from ...geometry.vectors import Array
 from ...mechanism import Mechanism
 from ...options import option
-from ...progress import tell
+from ...progress import report
 from ...tolerances import CLOSED
+from ..analysis_declaration import analysis
 from ..observed import RobotLike, as_robot
-from ..question import analysis
 from .answer import BranchCell, BranchPart, BranchProof
-from .back import way_back
 from .cells import prove_all
 from .ends import toggles, turns
 from .growth import CellGrid, GrownCell, Growth, largest_box, lattice, whole_box
+from .injectivity import prove_injective_box
 from .limits import branch_limits
+from .loop_parts import LoopPart, parts_of, whole
 from .loops import LoopSystem, loop_system
-from .part import LoopPart, parts_of, whole
 from .redundant import closed_to, unexplained_equations
 
 GROUPS = "the loops' links move in groups of fewer dimensions"
@@ -84,8 +84,8 @@ def branch(robot: RobotLike, box: MotorBox = None, *, effort: Cells = BRANCH_CEL
         growth = Growth(part, grid, q0, x0, _depth(part), effort, coarsest, _first(grid, q0, coarsest, effort)).run()
         grown.append(growth)
         found.append(_answer(part, growth))
-        tell("parts")
-    back, regular = way_back(system, grown)
+        report("parts")
+    back, regular = prove_injective_box(system, grown)
     units, names = system.units[list(system.driven)], system.names
     passive = tuple(names[i] for part in parts for i in part.unknowns)
     idle = tuple(names[i] for i in held)

@@ -10,8 +10,8 @@ from ...geometry.ranks import range_basis
 from ...geometry.vectors import Array
 from ...mechanism import JointType
 from .cells import BranchTube, evaluate_equations, trial_of
+from .loop_parts import LoopEquation, LoopPart
 from .loops import JointLoop, LoopSystem, parts
-from .part import LoopEquation, LoopPart
 
 
 def unexplained_equations(part: LoopPart) -> tuple[LoopEquation, ...]:

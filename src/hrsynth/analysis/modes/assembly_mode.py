@@ -10,19 +10,19 @@ import numpy as np
 from ...errors import LoopsNotClosed
 from ...geometry.vectors import Array, pose_difference
 from ...kinematics.assembly import NOT_FOUND, Assembler, Assembly, of_links
-from ...kinematics.closures import Miss
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.joint_coordinates import OfConfiguration
+from ...kinematics.leg_solutions import ReachFailure
 from ...kinematics.limits import outside
-from ...kinematics.relation import Measurement, relation
-from ...kinematics.tasks import Held
+from ...kinematics.tasks import FixedValuesTask
+from ...kinematics.velocity_relation import ObservationModel, relation
 from ...mechanism.pose import Pose
 from ...records import FLAT, As, Number, Record, Recorded, Shown
 from ...tolerances import CLOSED, SAME_RELATION
 from ..observed import ObservedRobot
-from ..singularity.agreement import weakest
+from ..singularity.condition_check import weakest
 from .branches import Model
-from .sighted import behind, opposite, sights
+from .observation_loci import behind, opposite, sights
 from .solve import SystemMode
 
 
@@ -30,7 +30,7 @@ class LegMissed(NamedTuple):
     """Why a leg of the real robot does not reach a mode, and by how much."""
 
     leg: str
-    miss: Annotated[Miss, FLAT]
+    miss: Annotated[ReachFailure, FLAT]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -55,16 +55,16 @@ class AssemblyMode(OfConfiguration, Record):
     reachable: Recorded[bool | None]
     type2_distance: Recorded[float | None]
     assembly: Annotated[str, Literal["yes", "beyond limits", "no", "not found"]] = NOT_FOUND
-    open: Recorded[tuple[str, ...]] = ()
-    beyond: Recorded[tuple[str, ...]] = ()
-    misses: tuple[tuple[str, Miss], ...] = ()
+    unclosed_legs: Recorded[tuple[str, ...]] = ()
+    beyond_limits: Recorded[tuple[str, ...]] = ()
+    misses: tuple[tuple[str, ReachFailure], ...] = ()
     configuration: ClosedConfiguration | None = None
     multiplicity: Recorded[int] = 1
     proved: Recorded[bool] = False
     """Whether there is exactly one mode within the radius, for all that the file's decimals and closed loops allow."""
     rounded: Recorded[bool] = False
     """Whether that is proved for the rounded geometry alone, of which the radius then speaks."""
-    fits: Annotated[float | None, "how well all legs fit if only some of them place it"] = None
+    match_residual: Annotated[float | None, "how well all legs fit if only some of them place it"] = None
     """How well all legs fit (characteristic lengths) where more is observed than needed and that is all that is known;
     the radius is then that of the mode, if it is one."""
     enclosed: Annotated[tuple[str, ...], As("bodies")] = ()
@@ -77,7 +77,9 @@ class AssemblyMode(OfConfiguration, Record):
     """What is seen there as the opposite value: then it is *antipodal* and no mode."""
     behind: Recorded[tuple[str, ...] | None] = None
     """What is not in front of the camera by which it is seen; None where no camera with a name sees a point."""
-    gears: Annotated[tuple[str, ...], As("open_couplings"), "couplings that were not closed where all legs were"] = ()
+    open_couplings: Annotated[
+        tuple[str, ...], As("open_couplings"), "couplings that were not closed where all legs were"
+    ] = ()
 
     def __repr__(self) -> str:
         said = "the pose itself" if self.goal else f"assembled: {self.assembly}"
@@ -86,7 +88,7 @@ class AssemblyMode(OfConfiguration, Record):
     @property
     def left_open(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
         """What was not closed there: of legs or couplings the noun and the names."""
-        return tuple(each for each in (("leg", self.open), ("coupling", self.gears)) if each[1])
+        return tuple(each for each in (("leg", self.unclosed_legs), ("coupling", self.open_couplings)) if each[1])
 
     @property
     def radius(self) -> float:
@@ -96,63 +98,65 @@ class AssemblyMode(OfConfiguration, Record):
     radius_record = Shown(Number, lambda self: self.radius, As("radius"), "null if it is not known")
     radius_m = Shown(Number, lambda self: self.shift if np.isfinite(self.radius) else None)
     radius_rad = Shown(Number, lambda self: self.turn if np.isfinite(self.radius) else None)
-    reasons = Shown(list[LegMissed], lambda self: [LegMissed(*each) for each in self.misses])
+    closure_failures = Shown(list[LegMissed], lambda self: [LegMissed(*each) for each in self.misses])
 
 
 def found_mode(
-    setting: ObservedRobot,
-    question: Measurement,
+    setup: ObservedRobot,
+    observation_model: ObservationModel,
     at: ClosedConfiguration,
     bodies: dict[str, Array],
     residual: float,
     goal: bool = False,
 ) -> AssemblyMode:
     """A closed configuration that was found, as a mode of which nothing is proved."""
-    beyond, X = tuple(outside(at.twin, at.q)), at.pose(setting.motion.link)
+    beyond, X = tuple(outside(at.model, at.q)), at.pose(setup.motion.link)
     found = Assembly(at, (), beyond)
     return AssemblyMode(
-        setting.motion.pose(X),
+        setup.motion.pose(X),
         np.inf,
         np.pi,
         residual,
         goal,
         found.reachable,
-        weakest(at, question),
+        weakest(at, observation_model),
         found.verdict,
         (),
         beyond,
         (),
         at,
-        length=at.twin.length,
+        length=at.model.length,
         bodies=bodies,
-        behind=behind(question.observations, at.pose),
+        behind=behind(observation_model.observations, at.pose),
     )
 
 
 class ModeReader:
     """Poses of a system read as poses of the robot."""
 
-    def __init__(self, setting: ObservedRobot, question: Measurement, goal: ClosedConfiguration, made: Model) -> None:
-        self.question, self.motion, self.made, self.goal = question, setting.motion, made, goal
-        self.assembler = Assembler(setting.anatomy, goal.twin.length, question.reference)
-        rest, self.seen = sights(setting.anatomy, question, goal)
-        self.measured = Held.at(goal.twin, goal.q, question.reference, rest.observations).measured
+    def __init__(
+        self, setup: ObservedRobot, observation_model: ObservationModel, goal: ClosedConfiguration, made: Model
+    ) -> None:
+        self.question, self.motion, self.made, self.goal = observation_model, setup.motion, made, goal
+        self.assembler = Assembler(setup.decomposition, goal.model.length, observation_model.reference)
+        rest, self.seen = sights(setup.decomposition, observation_model, goal)
+        self.measured = FixedValuesTask.at(goal.model, goal.q, observation_model.reference, rest.observations).measured
 
     def away(self, mode: SystemMode) -> float:
         """How far a mode is from the goal (characteristic lengths, differences of rotation matrices)."""
         return max(
-            pose_difference(X, self.goal.pose(body), self.goal.twin.length)
+            pose_difference(X, self.goal.pose(body), self.goal.model.length)
             for body, X in self.made.bodies(mode.q).items()
         )
 
     def read(self, mode: SystemMode, nearest: bool) -> AssemblyMode:
         """What a mode is for the robot; of all modes the ``nearest`` to the goal can be it."""
-        bodies, size = self.made.bodies(mode.q), self.goal.twin.length
+        bodies, size = self.made.bodies(mode.q), self.goal.model.length
         at_goal = nearest and self.away(mode) <= SAME_RELATION
         near = mode.near
         held = () if near else self.measured
         scale = self.made.system.size / size
-        base = self.goal.twin.mechanism.base
+        base = self.goal.model.mechanism.base
         pose = {base: self.goal.pose(base), **bodies}.__getitem__
         antipodal = opposite([each.seen for each in self.seen], self.goal, self.question.reference, pose)
         found = Assembly(self.goal)
@@ -160,8 +164,8 @@ class ModeReader:
             found = Assembly(None, platform=self.assembler.platform(bodies))
         elif self.made.closing is not None:
             at = self.made.closing(mode.q)
-            found = Assembly(at, (), tuple(outside(at.twin, at.q)), held=True)
-        elif not at_goal or near or outside(self.goal.twin, self.goal.q):
+            found = Assembly(at, (), tuple(outside(at.model, at.q)), held=True)
+        elif not at_goal or near or outside(self.goal.model, self.goal.q):
             found = self.assembler.at(bodies, held, 0.0 if near else self.doubt(mode))
         if found.configuration is not None and self.made.closing is None and (gears := self.open(found.configuration)):
             found = Assembly(None, platform=self.assembler.platform(bodies), gears=gears)
@@ -189,7 +193,7 @@ class ModeReader:
             mode.multiplicity,
             mode.proved,
             mode.rounded,
-            mode.residual * scale if mode.fits else None,
+            mode.residual * scale if mode.match_residual else None,
             () if self.motion.link in bodies else tuple(bodies),
             size,
             bodies,
@@ -204,26 +208,26 @@ class ModeReader:
 
     def open(self, at: ClosedConfiguration) -> tuple[str, ...]:
         """The couplings that do not close where legs do."""
-        twin = self.goal.twin
-        if not twin.mechanism.couplings:
+        model = self.goal.model
+        if not model.mechanism.couplings:
             return ()
         try:
-            whole = of_links(twin, at.pose)
+            whole = of_links(model, at.pose)
         except LoopsNotClosed:
             pass
         else:
             if all(
-                pose_difference(whole.pose(link), at.pose(link), at.twin.length) <= SAME_RELATION
-                for link in at.twin.mechanism.links
+                pose_difference(whole.pose(link), at.pose(link), at.model.length) <= SAME_RELATION
+                for link in at.model.mechanism.links
             ):
                 return ()
-        left = twin.gear_errors(twin.read({link: at.pose(link) for link in twin.mechanism.links}.__getitem__))
+        left = model.gear_errors(model.read({link: at.pose(link) for link in model.mechanism.links}.__getitem__))
         return tuple(name for name, miss in left.items() if abs(miss) > CLOSED) or tuple(left)
 
     def doubt(self, mode: SystemMode) -> float:
         """How far the bodies' exact poses can be from the system's (characteristic lengths, radians); 0 where nothing
         was proved of them: the told poses are meant."""
-        length = self.goal.twin.length
+        length = self.goal.model.length
         found = max(mode.shift / length, mode.turn) + self.made.system.error / length
         return found if np.isfinite(found) else 0.0
 
@@ -231,7 +235,7 @@ class ModeReader:
         """How far the exact pose can be from the pose X (4, 4) that is told (m, rad): the system's, with what its frame
         at the goal may be off, and what the told pose is from the system's; of the bodies where X is none of theirs."""
         first, error = next(iter(bodies.values())), self.made.system.error
-        shift, turn = mode.shift + error, mode.turn + error / self.goal.twin.length
+        shift, turn = mode.shift + error, mode.turn + error / self.goal.model.length
         told = bodies.get(self.motion.link)
         if told is None:
             return shift, turn

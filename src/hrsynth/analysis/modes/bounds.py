@@ -29,11 +29,11 @@ from typing import Any
 
 import numpy as np
 
-from .curves import Circle, Line, Plane, Point, Sphere
+from .constrained_platform import System
+from .loci import Circle, Line, Plane, Point, Sphere
 from .quadrics import UNIT, direction, normals
 from .rigid import Spatial
 from .roots import PRECISION
-from .systems import System
 from .translating import Articulated
 
 DEGREE = 40

@@ -16,10 +16,10 @@ from ...geometry.vectors import Array, inverse, plane_axes, pose, pose_differenc
 from ...kinematics.configuration import ClosedConfiguration
 from ...results import Value
 from ...tolerances import RANK_GAP, SAME_POINT
-from .curves import Circle, Line, Plane, Reach
+from .constrained_platform import System
+from .loci import Circle, Line, Plane, Reach
 from .rigid import Planar, Spatial
 from .solve import SystemMode, SystemModes, solve
-from .systems import System
 from .tips import TipLoci
 from .translating import Articulated, Translating
 
@@ -68,7 +68,7 @@ def _rigid(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -
     back = inverse(X_goal)
     tips = np.array([_point(back @ at[tip.body], tip.place) for tip in confined.tips]).reshape(-1, 3)
     if n is None:
-        size = confined.goal.twin.length
+        size = confined.goal.model.length
         arrows = np.array([size * (at[each.body][:3, :3] @ each.direction) for each in confined.angles]).reshape(-1, 3)
         planes = tuple(
             Plane(p + each.axis * float(each.axis @ arrow), each.axis)
@@ -166,7 +166,7 @@ def solve_all(confined: TipLoci, *, near: bool = True, effort: float = EFFORT) -
             f"only {len(made)} of {total} choices of the legs' branches were solved: all would need about "
             f"{total * first.seconds:g} s, and the effort is {effort:g} s"
         )
-    if doubts and modes.continuum is None:
+    if doubts and modes.continuous_family is None:
         proof = f"{modes.proof}; there may be other branches ({'; '.join(doubts)})"
         modes = replace(modes, complete=False, bound="none", proof=proof)
     return made[0], modes
@@ -192,7 +192,7 @@ def together(found: Sequence[SystemModes], branches: Mapping[str, int], size: fl
 
     A continuum on the goal's own branches is all that is told; on others it leaves the list open.
     """
-    if len(found) == 1 or found[0].continuum is not None:
+    if len(found) == 1 or found[0].continuous_family is not None:
         return found[0]
     modes = _once([mode for each in found for mode in each.modes], size)
     near = _once([*modes, *(mode for each in found for mode in each.near)], size)[len(modes) :]
@@ -207,8 +207,13 @@ def together(found: Sequence[SystemModes], branches: Mapping[str, int], size: fl
         + (f", {unclear} pairs not distinguished" if unclear else "")
         + f": {'; '.join(proofs)}"
     )
-    special = found[0].degenerate or next(
-        (f"on other branches of the legs: {each.degenerate}" for each in found if each.degenerate is not None), None
+    special = found[0].singular_solutions or next(
+        (
+            f"on other branches of the legs: {each.singular_solutions}"
+            for each in found
+            if each.singular_solutions is not None
+        ),
+        None,
     )
     complete = not unclear and all(each.complete for each in found)
     return SystemModes(
@@ -221,7 +226,7 @@ def together(found: Sequence[SystemModes], branches: Mapping[str, int], size: fl
         None,
         next((each.bound for each in found if each.bound != "resultant"), "resultant"),
         all(each.enclosed for each in found),
-        found[0].meant,
+        found[0].snapped,
         tuple(part for each in found for part in each.solved),
         any(each.open for each in found),
     )

@@ -21,7 +21,7 @@ from ...budgets import HOMOTOPY_ROUNDS, HOMOTOPY_STEPS
 from ...geometry.vectors import Array
 from ...tolerances import FARTHEST, POLISHED, SAME_END, SAME_SINGULAR_END, SINGULAR_END
 from .polynomials import Quadric
-from .study import forms
+from .study_coordinates import forms
 
 FIRST_STEP, SHORTEST_STEP, LAST_STEP = 0.05, 1e-12, 1e-9
 """Part of the way that is gone first, at which a path is given up, and that may be left at its end."""
@@ -33,7 +33,7 @@ POLISHES, ROUNDS = 4, 40
 
 
 @dataclass(frozen=True, eq=False)
-class Ends:
+class PathEndpoints:
     """Where the paths end: at ``solutions`` (m, 7), singular ones ``multiple`` times, real or with their conjugates;
     ``infinite``: how many end at no solution, ``lost``: how many were given up.
 
@@ -64,7 +64,9 @@ def _start() -> tuple[Array, Array]:
     return section(), _newton(section(), x, 2)[0]
 
 
-def ends(quadrics: Sequence[Quadric], study: Array, resting: Sequence[int] = (), enough: int | None = None) -> Ends:
+def ends(
+    quadrics: Sequence[Quadric], study: Array, resting: Sequence[int] = (), enough: int | None = None
+) -> PathEndpoints:
     """The ends of all paths to seven quadrics in unknowns x; other paths are taken where some were lost and fewer than
     ``enough`` solutions found.
 
@@ -89,7 +91,7 @@ def ends(quadrics: Sequence[Quadric], study: Array, resting: Sequence[int] = (),
     at = np.array([*found.sharp, *found.singular]).reshape(-1, 8) @ back.T
     multiple = (1,) * len(found.sharp) + found.multiple
     far = np.reshape(found.far, (-1, 8))
-    return Ends(at[:, 1:] / at[:, :1], multiple, len(far), found.lost, found.loose, far)
+    return PathEndpoints(at[:, 1:] / at[:, :1], multiple, len(far), found.lost, found.loose, far)
 
 
 def _corners() -> tuple[Array, Array]:
@@ -150,7 +152,7 @@ def _follow_paths(start: Array, wanted: Array, x: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Sorted:
-    """As :class:`Ends`, in unit vectors."""
+    """As :class:`PathEndpoints`, in unit vectors."""
 
     sharp: Sequence[Array] = ()
     singular: Sequence[Array] = ()

@@ -86,7 +86,8 @@ def beyond(part: PoseSystem, balls: Within, far: Array, wanted: int) -> int:
 
 
 def _enclose_infinity(part: PoseSystem, balls: Within, far: Array, mark: Array) -> int:
-    """As :func:`beyond`, with e and g' fixed by mark·e = 1 and mark·g' = 0; ``mark`` (4,) has entries of length one."""
+    """As :func:`beyond_limits`, with e and g' fixed by mark·e = 1 and mark·g' = 0; ``mark`` (4,) has entries of length
+    one."""
     from flint import acb
 
     study, own = part.chart.study, part.chart.nonzero

@@ -26,7 +26,7 @@ from ...tolerances import RANK_OF_FORMS
 from .pose_bound import PRIME, residues
 
 if TYPE_CHECKING:
-    from .carried import CarriedPlatform, Told, Turn
+    from .carrying_leg_system import CarriedCondition, CarriedPlatform, Turn
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,11 +43,11 @@ def _steps(freedoms: Sequence[Turn]) -> list[int]:
     return [1 if each.slides else 2 for each in freedoms]
 
 
-def _degrees(system: CarriedPlatform, chosen: Sequence[Told]) -> list[list[int]]:
+def _degrees(system: CarriedPlatform, chosen: Sequence[CarriedCondition]) -> list[list[int]]:
     return [[each.degree(k, f) for k, f in enumerate(system.freedoms_)] for each in chosen]
 
 
-def closings_bound(system: CarriedPlatform, chosen: Sequence[Told]) -> Counted | None:
+def closings_bound(system: CarriedPlatform, chosen: Sequence[CarriedCondition]) -> Counted | None:
     """D of some conditions, as many as joints; None where there are infinitely many, or the forms would be too many."""
     steps, degrees = _steps(system.freedoms_), _degrees(system, chosen)
     # from these degrees on, were all zeros isolated, there are as many functionals as zeros
@@ -63,7 +63,7 @@ def closings_bound(system: CarriedPlatform, chosen: Sequence[Told]) -> Counted |
     return None
 
 
-def eigenvalues(system: CarriedPlatform, chosen: Sequence[Told], counted: Counted) -> Array:
+def eigenvalues(system: CarriedPlatform, chosen: Sequence[CarriedCondition], counted: Counted) -> Array:
     """All closings q (n, joints), complex, to rounding: functionals on exp(i m q) and powers of slides that vanish on
     the multiples of the conditions, on which the multiplication by exp(i q), or by a slide, has them as eigenvalues."""
     from scipy.linalg import qr
@@ -94,7 +94,7 @@ def eigenvalues(system: CarriedPlatform, chosen: Sequence[Told], counted: Counte
         return np.asarray(np.where(slides, found, -1j * np.log(found)))
 
 
-def _coefficients(system: CarriedPlatform, told: Told, own: Sequence[int]) -> Array:
+def _coefficients(system: CarriedPlatform, told: CarriedCondition, own: Sequence[int]) -> Array:
     """Of exp(i m q), |m| up to half the degree, and of powers of slides; one axis a joint."""
     nodes = [
         np.cos(np.pi * (np.arange(d + 1) + 0.5) / (d + 1)) if f.slides else 2 * np.pi * np.arange(d + 1) / (d + 1)
@@ -118,7 +118,7 @@ def _within(sizes: Sequence[int], steps: Array, k: int, shift: Array) -> list[in
 
 def _dimensions(
     system: CarriedPlatform,
-    chosen: Sequence[Told],
+    chosen: Sequence[CarriedCondition],
     degrees: Sequence[Sequence[int]],
     least: Sequence[int],
     t: Sequence[int],
@@ -168,7 +168,7 @@ def _move(freedom: Turn, a: Any, y: Any, z: Any, w: Any) -> tuple[Any, Any]:
     return turn, (o - turn @ o) % PRIME
 
 
-def _value(system: CarriedPlatform, told: Told, moves: Sequence[tuple[Any, Any]]) -> Any:
+def _value(system: CarriedPlatform, told: CarriedCondition, moves: Sequence[tuple[Any, Any]]) -> Any:
     """Of a condition (n,), joints that change nothing of it left out."""
     count = len(moves[0][0])
     x, d = (np.broadcast_to(residues(v), (count, 3)) for v in (told.condition.b, told.condition.c))

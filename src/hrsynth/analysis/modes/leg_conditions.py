@@ -9,13 +9,13 @@ from functools import partial
 import numpy as np
 
 from ...constraints.pattern import leg_ends
-from ...errors import NotConfined
+from ...errors import UnsupportedLocus
 from ...geometry import lines
 from ...geometry.ranks import range_basis
 from ...geometry.vectors import Array, plane_axes
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.locked import carry_joint, leg_twists
-from ...kinematics.relation import Measurement
+from ...kinematics.locked_twists import carry_joint, leg_twists
+from ...kinematics.velocity_relation import ObservationModel
 from ...mechanism import JointType, Observation
 from ...mechanism.composites import WordEdge
 from ...mechanism.legs import Leg, LegDecomposition
@@ -23,7 +23,6 @@ from ...mechanism.notation import Rods
 from ...mechanism.observations.direction import Direction
 from ...tolerances import CHAIN_ROUNDING, SAME_POINT, SAME_RELATION
 from ..measured import MeasuredRobot
-from .chain import Chain, ChainBody, Underived, chain
 from .conditions import (
     AtAngle,
     Coplanar,
@@ -35,9 +34,10 @@ from .conditions import (
     OnTwoCircles,
     PoseCondition,
 )
-from .curves import Circle, Line, Plane, Point, Quadrics, Reach, Revolution, Sphere, SweptCircle
-from .reaches import apart, place
-from .turns import Known, groups, one_axis, orientations, two_axes
+from .leg_orientations import Known, groups, one_axis, orientations, two_axes
+from .loci import Circle, Line, Plane, Point, Quadrics, Reach, Revolution, Sphere, SweptCircle
+from .loci_from_joints import apart, place
+from .locked_chain import Chain, ChainBody, LocusNotDerived, chain
 
 Branches = list[list[PoseCondition]]
 _Read = tuple[Branches, float]
@@ -46,7 +46,7 @@ _Reading = Callable[..., _Read]
 
 
 @dataclass(frozen=True, eq=False)
-class Middle:
+class OriginAndUnit:
     """Where lengths are counted from (m), and in which unit (m)."""
 
     origin: Array
@@ -57,40 +57,42 @@ class Middle:
         return np.asarray((at - self.origin) / self.size)
 
 
-def rigid_platform(measured: MeasuredRobot, goal: ClosedConfiguration) -> tuple[str, Middle]:
-    """The one body on which all legs end, and lengths from where it is at the goal. Raises ``NotConfined``."""
-    anatomy = measured.setting.anatomy
-    bodies = leg_ends(anatomy)
-    if len(bodies) != 1 or anatomy.point is not None or anatomy.mechanism.couplings:
-        raise NotConfined(measured.setting.robot.name, "its platform is not one rigid body whose pose the legs decide")
-    return bodies[0], Middle(goal.pose(bodies[0])[:3, 3], goal.twin.length)
+def rigid_platform(measured: MeasuredRobot, goal: ClosedConfiguration) -> tuple[str, OriginAndUnit]:
+    """The one body on which all legs end, and lengths from where it is at the goal. Raises ``UnsupportedLocus``."""
+    decomposition = measured.setup.decomposition
+    bodies = leg_ends(decomposition)
+    if len(bodies) != 1 or decomposition.point is not None or decomposition.mechanism.couplings:
+        raise UnsupportedLocus(
+            measured.setup.robot.name, "its platform is not one rigid body whose pose the legs decide"
+        )
+    return bodies[0], OriginAndUnit(goal.pose(bodies[0])[:3, 3], goal.model.length)
 
 
 def leg_conditions(
-    anatomy: LegDecomposition,
+    decomposition: LegDecomposition,
     leg: Leg,
-    question: Measurement,
+    observation_model: ObservationModel,
     goal: ClosedConfiguration,
-    middle: Middle,
+    middle: OriginAndUnit,
     plane: Array | None = None,
     kept: bool = False,
 ) -> tuple[Branches, float]:
     """All branches of what a leg, with its measurements held, asks of the platform, the goal's own first; and how far
     its geometry was moved (m). ``plane``: the normal of a motion in a plane; ``kept``: whether the platform does not
-    turn. Raises ``NotConfined``."""
-    own = [o for o in question.observations if o.leg == leg.label]
-    twists = leg_twists(goal, leg, own, question.reference)
+    turn. Raises ``UnsupportedLocus``."""
+    own = [o for o in observation_model.observations if o.leg == leg.label]
+    twists = leg_twists(goal, leg, own, observation_model.reference)
     count = (6 if plane is None else 3) - twists.shape[1]
     if kept:
         count = 3 - twists.shape[1] + range_basis(twists[3:], 1.0)[1].value
     if count <= 0:
         return [[]], 0.0
-    path = anatomy.path(leg)
-    rods = _Rods.of(anatomy, path[-1], own, goal)
+    path = decomposition.path(leg)
+    rods = _Rods.of(decomposition, path[-1], own, goal)
     reasons = []
-    for tip in _tips(anatomy, path, goal) if rods is None else (rods.tip,):
+    for tip in _tips(decomposition, path, goal) if rods is None else (rods.tip,):
         try:
-            found = chain(anatomy, leg, own, goal, tip, "free")
+            found = chain(decomposition, leg, own, goal, tip, "free")
             ways: list[tuple[_Reading, Chain]] = [
                 (partial(_of_tip, rods=rods), found),
                 (_of_foot, found),
@@ -105,24 +107,24 @@ def leg_conditions(
                 try:
                     branches, radii = read(leg.label, each, count, tip, middle, plane)
                     return branches, found.moved + (radii if radii > CHAIN_ROUNDING * found.extent else 0.0)
-                except Underived as error:
+                except LocusNotDerived as error:
                     reasons.append(str(error))
-        except Underived as error:
+        except LocusNotDerived as error:
             reasons.append(str(error))
-    raise NotConfined(
-        anatomy.mechanism.name,
+    raise UnsupportedLocus(
+        decomposition.mechanism.name,
         f"what leg {leg.label} requires of the platform is not known: {'; '.join(dict.fromkeys(reasons))}",
     )
 
 
-def _tips(anatomy: LegDecomposition, path: Sequence[WordEdge], goal: ClosedConfiguration) -> Iterator[Array]:
+def _tips(decomposition: LegDecomposition, path: Sequence[WordEdge], goal: ClosedConfiguration) -> Iterator[Array]:
     """The centre of the last joint (m), and where its axis meets those of other joints: about these a leg turns."""
-    joints = [anatomy.mechanism.joints[name] for edge in path for name in edge.joints]
-    *others, (end, axes) = (carry_joint(anatomy.mechanism, joint, goal.pose) for joint in joints)
+    joints = [decomposition.mechanism.joints[name] for edge in path for name in edge.joints]
+    *others, (end, axes) = (carry_joint(decomposition.mechanism, joint, goal.pose) for joint in joints)
     yield end
     if joints[-1].type is JointType.REVOLUTE:
         met = (
-            lines.meeting_point([(end, axes[0]), (at, each)], SAME_POINT * goal.twin.length)
+            lines.meeting_point([(end, axes[0]), (at, each)], SAME_POINT * goal.model.length)
             for at, own in others
             for each in own
             if not lines.parallel(axes[0], each)
@@ -141,7 +143,7 @@ class _Rods:
 
     @classmethod
     def of(
-        cls, anatomy: LegDecomposition, edge: WordEdge, own: Sequence[Observation], goal: ClosedConfiguration
+        cls, decomposition: LegDecomposition, edge: WordEdge, own: Sequence[Observation], goal: ClosedConfiguration
     ) -> _Rods | None:
         """Those of the last part of a leg, where it is such rods."""
         if not isinstance(edge.word.items[0], Rods) or len(edge.joints) < 4:
@@ -150,12 +152,12 @@ class _Rods:
         number = next((k for k, link in enumerate(edge.inside) if link in watched), 0)
         ends = [
             [
-                carry_joint(anatomy.mechanism, anatomy.mechanism.joints[name], goal.pose)[0]
+                carry_joint(decomposition.mechanism, decomposition.mechanism.joints[name], goal.pose)[0]
                 for name in edge.joints[k : k + 2]
             ]
             for k in range(0, len(edge.joints), 2)
         ]
-        ends = [pair if edge.joints and edge.head in anatomy.platform else pair[::-1] for pair in ends]
+        ends = [pair if edge.joints and edge.head in decomposition.platform else pair[::-1] for pair in ends]
         near, far = ends[number]
         others = [pair for k, pair in enumerate(ends) if k != number]
         return cls(far, far - near, tuple((start - near, end - far) for start, end in others))
@@ -166,13 +168,13 @@ class _Rods:
         carrier = len(found.bodies) - 3
         Q, axis = known[carrier], found.bodies[carrier].axis
         if Q is None and (axis is None or known[carrier - 1] is None):
-            raise Underived("what carries its rods turns")
+            raise LocusNotDerived("what carries its rods turns")
         if (Q is not None and np.abs(Q - np.eye(3)).max() > SAME_RELATION) or any(
             Q is None and axis is not None and not lines.parallel(e / np.linalg.norm(e), axis) for e, _ in self.across
         ):
-            raise Underived("what carries its rods turns them")
+            raise LocusNotDerived("what carries its rods turns them")
         if any(abs(float(e @ e - f @ f)) > SAME_RELATION * found.length**2 for e, f in self.across):
-            raise Underived("its rods are not those of a parallelogram")
+            raise LocusNotDerived("its rods are not those of a parallelogram")
         return [
             ((self.along - e) / found.length, f / found.length, float((self.along - e) @ e) / found.length**2)
             for e, f in self.across
@@ -180,7 +182,13 @@ class _Rods:
 
 
 def _of_tip(
-    leg: str, found: Chain, count: int, tip: Array, middle: Middle, plane: Array | None, rods: _Rods | None = None
+    leg: str,
+    found: Chain,
+    count: int,
+    tip: Array,
+    middle: OriginAndUnit,
+    plane: Array | None,
+    rods: _Rods | None = None,
 ) -> _Read:
     """A tip that is confined, and angles that are kept."""
     seen: list[tuple[Reach | Quadrics, list[tuple[Array, Array, float]]]] = []
@@ -198,7 +206,7 @@ def _of_tip(
             d, c = one_axis(found, known)
             turns = [*((a, c, 0.0) for a in plane_axes(d)), (d, c, 1.0)]
         elif missing:
-            raise Underived(f"{missing} conditions on how the platform turns")
+            raise LocusNotDerived(f"{missing} conditions on how the platform turns")
         if not any(_alike(reach, other, found.length) and _same_turns(turns, others) for other, others in seen):
             seen.append((reach, turns))
     b = middle.point(tip)
@@ -231,7 +239,7 @@ def _same_turns(one: list[tuple[Array, Array, float]], other: list[tuple[Array, 
 
 
 def _reach_conditions(
-    leg: str, reach: Reach | Quadrics, tip: Array, middle: Middle, plane: Array | None
+    leg: str, reach: Reach | Quadrics, tip: Array, middle: OriginAndUnit, plane: Array | None
 ) -> list[PoseCondition]:
     """The conditions that a tip is within its reach."""
     b, none, o = middle.point(tip), np.zeros(3), middle.point(reach.centre)
@@ -271,7 +279,9 @@ def _across(d: Array) -> list[Array]:
     return [np.cross(d, e) for k, e in enumerate(np.eye(3)) if k != skip]
 
 
-def _in_motion(leg: str, reach: Reach | Quadrics, b: Array, o: Array, n: Array, middle: Middle) -> list[PoseCondition]:
+def _in_motion(
+    leg: str, reach: Reach | Quadrics, b: Array, o: Array, n: Array, middle: OriginAndUnit
+) -> list[PoseCondition]:
     """The same in a plane with the normal n, whatever the heights above it."""
     none = np.zeros(3)
     if isinstance(reach, Point):
@@ -281,24 +291,24 @@ def _in_motion(leg: str, reach: Reach | Quadrics, b: Array, o: Array, n: Array, 
         return [OnPlane(leg, b, none, v, float(v @ o))]
     if isinstance(reach, Circle):
         return [OnRevolution(leg, b, none, o, n, np.array([(reach.radius / middle.size) ** 2, 0.0, 0.0]))]
-    raise Underived(f"a {type(reach).__name__.lower()} in a plane")
+    raise LocusNotDerived(f"a {type(reach).__name__.lower()} in a plane")
 
 
-def _profile(reach: Revolution, middle: Middle) -> Array:
+def _profile(reach: Revolution, middle: OriginAndUnit) -> Array:
     return np.array(reach.profile) / [middle.size**2, middle.size, 1.0]
 
 
-def _of_foot(leg: str, found: Chain, count: int, tip: Array, middle: Middle, plane: Array | None) -> _Read:
+def _of_foot(leg: str, found: Chain, count: int, tip: Array, middle: OriginAndUnit, plane: Array | None) -> _Read:
     """A point of the base that is confined in the platform's frame, by what follows the last body at rest."""
     seen: list[tuple[Reach | Quadrics, Array]] = []
     moved = 0.0
     for known, _ in orientations(found):
-        foot, rest = turned_round(found, known)
+        foot, rest = chain_from_platform(found, known)
         for own, _ in orientations(rest):
             reach, radii = place(rest, own)
             moved = max(moved, radii)
             if (3 if plane is None else 2) - reach.freedoms != count:
-                raise Underived("its foot and how it turns the platform")
+                raise LocusNotDerived("its foot and how it turns the platform")
             if not any(
                 _alike(reach, other, found.length) and np.linalg.norm(foot - at) <= SAME_RELATION * found.length
                 for other, at in seen
@@ -307,7 +317,9 @@ def _of_foot(leg: str, found: Chain, count: int, tip: Array, middle: Middle, pla
     return [_holds(leg, reach, foot, middle, plane) for reach, foot in seen], moved
 
 
-def _holds(leg: str, reach: Reach | Quadrics, foot: Array, middle: Middle, plane: Array | None) -> list[PoseCondition]:
+def _holds(
+    leg: str, reach: Reach | Quadrics, foot: Array, middle: OriginAndUnit, plane: Array | None
+) -> list[PoseCondition]:
     o, b, none = middle.point(foot), middle.point(reach.centre), np.zeros(3)
     if isinstance(reach, Revolution):
         return [OnMovingRevolution(leg, b, reach.axis, o, _profile(reach, middle))]
@@ -323,12 +335,12 @@ def _holds(leg: str, reach: Reach | Quadrics, foot: Array, middle: Middle, plane
             leg, b, none, o, np.array([0.0, 0.0, 1.0]), np.array([(reach.radius / middle.size) ** 2, 0.0, -1.0])
         )
         return [*([OnMovingPlane(leg, b, reach.axis, o, 0.0)] if isinstance(reach, Circle) else []), ball]
-    raise Underived(f"a {type(reach).__name__.lower()} of the platform that holds its foot")
+    raise LocusNotDerived(f"a {type(reach).__name__.lower()} of the platform that holds its foot")
 
 
-def turned_round(found: Chain, known: Known) -> tuple[Array, Chain]:
+def chain_from_platform(found: Chain, known: Known) -> tuple[Array, Chain]:
     """The foot (m), the place of what follows the last body of known orientation, and the chain from the platform to
-    it. Raises :class:`Underived` where it holds a measurement."""
+    it. Raises :class:`LocusNotDerived` where it holds a measurement."""
     last = max(k for k, Q in enumerate(known) if Q is not None)
     bodies = found.bodies[last:]
     if (
@@ -336,12 +348,12 @@ def turned_round(found: Chain, known: Known) -> tuple[Array, Chain]:
         or len(bodies) < 2
         or any(body.slides or body.cranks for body in found.bodies[: last + 1])
     ):
-        raise Underived("what is measured or carried does not let it be read from the platform")
+        raise LocusNotDerived("what is measured or carried does not let it be read from the platform")
     foot = found.bodies[0].point + sum(
         (Q @ body.shift for Q, body in zip(known[: last + 1], found.bodies, strict=False) if Q is not None), np.zeros(3)
     )
     if any(Q is None for Q in known[:last]):
-        raise Underived("a body that turns before its foot")
+        raise LocusNotDerived("a body that turns before its foot")
     end = bodies[-1]
     new = [ChainBody(None, end.point + end.shift, -end.shift, end.slides)]
     for before, after in zip(bodies[-2::-1], bodies[:0:-1], strict=True):
@@ -350,7 +362,7 @@ def turned_round(found: Chain, known: Known) -> tuple[Array, Chain]:
     return foot, Chain(tuple(new), False, found.length, found.off)
 
 
-def _in_plane(leg: str, found: Chain, count: int, tip: Array, middle: Middle, plane: Array | None) -> _Read:
+def _in_plane(leg: str, found: Chain, count: int, tip: Array, middle: OriginAndUnit, plane: Array | None) -> _Read:
     """An axis t through the foot, axes n normal to it between which all lies in a plane, and an axis c through the tip
     normal to those: t, foot to tip and c lie in one plane."""
     bodies = found.bodies
@@ -360,10 +372,10 @@ def _in_plane(leg: str, found: Chain, count: int, tip: Array, middle: Middle, pl
         or bodies[0].slides
         or any(body.axis is None for body in bodies[1:])
     ):
-        raise Underived("another chain of axes")
+        raise LocusNotDerived("another chain of axes")
     parts = groups([(k, body.axis) for k, body in enumerate(found.bodies) if body.axis is not None])
     if [len(part) for part in parts] != [1, 2, 1]:
-        raise Underived("another chain of axes")
+        raise LocusNotDerived("another chain of axes")
     (_, t), n, (_, c) = parts[0][0], parts[1][0][1], parts[2][0]
     first, *inner, last = found.bodies[1:]
     flat = [first.shift, *(v for body in (first, *inner) for v in body.slides), *(body.shift for body in inner)]
@@ -378,5 +390,5 @@ def _in_plane(leg: str, found: Chain, count: int, tip: Array, middle: Middle, pl
         or np.linalg.norm(last.shift) > small
         or sum(len(body.slides) for body in inner) != 1
     ):
-        raise Underived("axes that are not normal to each other")
+        raise LocusNotDerived("axes that are not normal to each other")
     return [[Coplanar(leg, middle.point(tip), c, middle.point(first.point), t)]], 0.0

@@ -9,43 +9,43 @@ from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
-from ...batch.reach import reach
+from ...batch.pose_continuation import reach
 from ...budgets import EFFORT
 from ...constraints.pattern import placing_links
-from ...errors import BadRequest, MissingExtra, NotConfined, PoseNotReached, TooLarge, Unsolved
+from ...errors import BadRequest, MissingExtra, PoseNotReached, SystemNotSolved, TooLarge, UnsupportedLocus
 from ...kinematics.assembly import Assembly, of_links
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.joint_coordinates import reach_joints
 from ...kinematics.limits import outside
-from ...kinematics.relation import Measurement
 from ...kinematics.tasks import Task
+from ...kinematics.velocity_relation import ObservationModel
 from ...mechanism.observation import Observation
 from ...mechanism.pose import JointPose, ModeNumber, Pose, PoseLike, asked_pose
 from ...options import option
-from ...progress import tell
+from ...progress import report
 from ...records import FLAT, OPTIONAL, As, Shown, recorded
 from ...results import Result
 from ...tolerances import MEASUREMENT_BOUND, SAME_NEAR_POSE
+from ..analysis_declaration import analysis
 from ..formation import Formation
 from ..measured import MeasuredRobot
 from ..observed import POINTS, UNLIMITED, CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SeeLike
-from ..question import analysis
 from .assembly_mode import AssemblyMode, ModeReader, found_mode
 from .branches import Model
-from .carried import CarriedPlatform
-from .carried_modes import solve_carried
-from .drift import drift
-from .formed import formation_modes
-from .motions import SelfMotion, self_motion
+from .carrying_leg_modes import solve_carried
+from .carrying_leg_system import CarriedPlatform
+from .formation_modes import formation_modes
+from .goal_error import drift
+from .methods import better_ways, solve_tips, without_couplings
 from .near import NearMode, measurement_bound, near_modes, poses_alike
 from .planar_loops import PlanarLoops
 from .planar_modes import solve_loops
-from .posed import PosedPlatform, solve_posed
+from .pose_conditions_solver import PosedPlatform, solve_posed
 from .search import FoundMode, leaves_free, search
+from .self_motions import SelfMotion, self_motion
 from .single_loop import solve_loop
 from .solve import SystemModes, continuum
 from .tips import TipLoci
-from .ways import better_ways, solve_tips, without_couplings
 
 WITHIN = {
     "formation": "configurations up to trivial motions",
@@ -101,7 +101,7 @@ class AssemblyModes(Result, shown_as="modes"):
     ``modes`` those that lie on none.
     """
 
-    setting: ObservedRobot
+    setup: ObservedRobot
     kind: Annotated[str, Literal["hidden", "real", "formation"]]
     goal: ClosedConfiguration
     pose: Pose
@@ -109,11 +109,11 @@ class AssemblyModes(Result, shown_as="modes"):
     modes: tuple[AssemblyMode, ...]
     candidates: tuple[AssemblyMode, ...] = ()
     """Where near modes are sought: working material, none once they are."""
-    near: Annotated[tuple[NearMode, ...], As("near_modes"), "found, not proved to be all"] = ()
+    near_modes: Annotated[tuple[NearMode, ...], As("near_modes"), "found, not proved to be all"] = ()
     """Other poses at which what is measured differs by no more than ``bound`` (rad)."""
-    bound: Annotated[float, As("measurement_bound"), "error (rad) up to which near modes are sought"] = 0.0
+    measurement_bound: Annotated[float, As("measurement_bound"), "error (rad) up to which near modes are sought"] = 0.0
     model: Model | None = None
-    motions: tuple[SelfMotion, ...] = ()
+    self_motions: tuple[SelfMotion, ...] = ()
     antipodal: tuple[AssemblyMode, ...] = ()
     """Solutions of the same equations at which something is seen as the opposite value."""
     formation: Annotated[Formation | None, Formation, OPTIONAL] = None
@@ -152,27 +152,28 @@ class AssemblyModes(Result, shown_as="modes"):
     def headline(self) -> str:
         """The robot and how many modes there are."""
         if self.formation is not None:
-            return f"{self.setting.headline()}: {self.count} (formation)"
+            return f"{self.setup.headline()}: {self.count} (formation)"
         said = (
             f"{self.count} ({self.kind} robot)"
-            if not self.near
+            if not self.near_modes
             else (f"{self.alike} ({self.count}, {self.kind} robot)")
         )
-        return f"{self.setting.headline()}: {said} at {self.pose}"
+        return f"{self.setup.headline()}: {said} at {self.pose}"
 
     @property
     def alike(self) -> str:
         """How many poses a measurement with an error does not tell from each other, in words."""
-        return poses_alike(self.modes, self.near)
+        return poses_alike(self.modes, self.near_modes)
 
     @property
     def count(self) -> str:
         """How many there are, in words."""
-        if self.found.continuum is not None and (self.found.complex is not None or self.formation is not None):
+        if self.found.continuous_family is not None and (self.found.complex is not None or self.formation is not None):
             return "a continuum"
-        if self.motions:
+        if self.self_motions:
+            count = len(self.self_motions)
             return (
-                f"{len(self.motions)} self-motion{'s' * (len(self.motions) > 1)}, and {len(self.modes)} real that "
+                f"{count} self-motion{'s' * (count > 1)}, and {len(self.modes)} real that "
                 f"{'lies' if len(self.modes) == 1 else 'lie'} on none"
             )
         other = f" and {len(self.antipodal)} antipodal" if self.antipodal else ""
@@ -182,30 +183,30 @@ class AssemblyModes(Result, shown_as="modes"):
 
     def pose_of(self, motion: SelfMotion) -> Pose:
         """A pose on a self-motion, from which it was followed."""
-        return self.setting.motion.pose(motion.configuration.pose(self.setting.motion.link))
+        return self.setup.motion.pose(motion.configuration.pose(self.setup.motion.link))
 
     at = Shown(Pose, lambda self: self.pose)
-    observed = Shown(tuple[Observation, ...], lambda self: self.setting.observed)
-    complex = Shown(int | None, lambda self: None if self.found.continuum else self.found.complex)
+    observed = Shown(tuple[Observation, ...], lambda self: self.setup.observed)
+    complex = Shown(int | None, lambda self: None if self.found.continuous_family else self.found.complex)
     complete = Shown(bool, lambda self: self.found.complete)
     bound_record = Shown(str, lambda self: self.found.bound, As("bound"))
     proof = Shown(str, lambda self: self.found.proof)
     modes_record = Shown(list[ListedMode], lambda self: self._listed(self.modes), As("modes"))
     antipodal_record = Shown(list[ListedMode], lambda self: self._listed(self.antipodal), As("antipodal"))
-    degenerate = Shown(str | None, lambda self: self.found.degenerate)
-    continuum = Shown(int | None, lambda self: self.found.continuum)
+    singular_solutions = Shown(str | None, lambda self: self.found.singular_solutions)
+    continuous_family = Shown(int | None, lambda self: self.found.continuous_family)
     motions_record = Shown(
         list[FollowedMotion],
-        lambda self: [FollowedMotion(self.pose_of(each), each) for each in self.motions],
+        lambda self: [FollowedMotion(self.pose_of(each), each) for each in self.self_motions],
         As("motions"),
     )
-    meant = Shown(
+    snapped = Shown(
         list[MeantLegs],
         lambda self: [
-            MeantLegs(each.where, [self.labels[k] for k in each.legs], each.defect) for each in self.found.meant
+            MeantLegs(each.where, [self.labels[k] for k in each.legs], each.defect) for each in self.found.snapped
         ],
     )
-    unlimited = Shown(list[str], lambda self: self.setting.unlimited, UNLIMITED)
+    limits_ignored = Shown(list[str], lambda self: self.setup.limits_ignored, UNLIMITED)
 
     def _listed(self, modes: Iterable[AssemblyMode]) -> list[ListedMode]:
         """Modes with where all bodies of a formation are."""
@@ -279,7 +280,7 @@ def modes(
     they are all. The same is done if modes lie on a self-motion: the equations then have infinitely many solutions, or
     rounding makes some of them seem isolated.
 
-    Raises ``BadRequest`` for unknown names, ``PoseNotReached`` for a pose out of reach, ``MeaningUndecided`` if it is
+    Raises ``BadRequest`` for unknown names, ``PoseNotReached`` for a pose out of reach, ``GeometryAmbiguous`` if it is
     not clear whether special geometry is meant.
 
     >>> hrsynth.modes("3rrr_m1", at="x=0,y=0,phi=0")
@@ -290,28 +291,28 @@ def modes(
             "the motors are held instead of what is observed", f"real with {observe or see}", "one of the two"
         )
     bound = measurement_bound(cone)
-    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed, driven=real)
-    if setting.robot.formation:
-        return _modes_of_formation(setting, at, real)
+    setup = ObservedRobot.of(robot, observe, camera, see=see, seed=seed, driven=real)
+    if setup.robot.formation:
+        return _modes_of_formation(setup, at, real)
     asked = None if at is None or isinstance(at, ClosedConfiguration) else asked_pose(at)
     if isinstance(asked, ModeNumber):
-        at, asked = at_mode(modes(setting), asked), None
+        at, asked = at_mode(modes(setup), asked), None
     elif isinstance(asked, JointPose):
-        at, asked = reach_joints(setting.everything.start, setting.motion, asked), None
-    setting = setting if asked is None else setting.telling([asked])
-    motion, wanted = setting.motion, None
-    goal = at if isinstance(at, ClosedConfiguration) else setting.everything.start
+        at, asked = reach_joints(setup.all_samples.start, setup.motion, asked), None
+    setup = setup if asked is None else setup.telling([asked])
+    motion, wanted = setup.motion, None
+    goal = at if isinstance(at, ClosedConfiguration) else setup.all_samples.start
     if asked is not None:
-        wanted = motion.goal(asked, setting.robot.name)
-        goal = reach(goal, setting.everything.question, asked, motion)
-    measured = MeasuredRobot.of(setting, real)
-    found = _list_modes(setting, measured, goal, wanted, real, as_written, effort)
-    near = near_modes(setting, goal, measured.question, found.modes, found.candidates, bound)
-    return replace(found, candidates=(), near=near, bound=bound)
+        wanted = motion.goal(asked, setup.robot.name)
+        goal = reach(goal, setup.all_samples.observation_model, asked, motion)
+    measured = MeasuredRobot.of(setup, real)
+    found = _list_modes(setup, measured, goal, wanted, real, as_written, effort)
+    near = near_modes(setup, goal, measured.observation_model, found.modes, found.candidates, bound)
+    return replace(found, candidates=(), near_modes=near, measurement_bound=bound)
 
 
 def _list_modes(
-    setting: ObservedRobot,
+    setup: ObservedRobot,
     measured: MeasuredRobot,
     goal: ClosedConfiguration,
     wanted: Task | None,
@@ -320,34 +321,36 @@ def _list_modes(
     effort: float,
 ) -> AssemblyModes:
     """The modes of the numbers as they are, and where near ones are sought."""
-    motion = setting.motion
+    motion = setup.motion
     pose = motion.pose(goal.pose(motion.link))
     kind = "real" if real else "hidden"
-    free = setting.dof - measured.rank
+    free = setup.dof - measured.rank
     if free:
         text = f"the {'motors' if real else 'measurements'} leave {free} of the platform's freedoms undetermined"
-        own = self_motion(goal, measured.question, placing_links(setting.anatomy), goal=True)
+        own = self_motion(goal, measured.observation_model, placing_links(setup.decomposition), goal=True)
         return AssemblyModes(
-            setting,
+            setup,
             kind,
             goal,
             pose,
             continuum(f"{text}: a continuum of dimension {free}", free),
             (),
-            motions=() if own is None else (own,),
+            self_motions=() if own is None else (own,),
         )
-    tell("modes")
+    report("modes")
     try:
-        if not as_written and _moves(setting, measured.question, goal):
-            return _modes_by_search(setting, measured.question, goal, pose, kind, "the pose lies on a self-motion")
-        listed = _modes_by_system(setting, measured, goal, wanted, pose, kind, as_written, effort)
-    except (NotConfined, Unsolved, TooLarge, MissingExtra) as error:
-        return _modes_by_search(setting, measured.question, goal, pose, kind, error.reason)
+        if not as_written and _moves(setup, measured.observation_model, goal):
+            return _modes_by_search(
+                setup, measured.observation_model, goal, pose, kind, "the pose lies on a self-motion"
+            )
+        listed = _modes_by_system(setup, measured, goal, wanted, pose, kind, as_written, effort)
+    except (UnsupportedLocus, SystemNotSolved, TooLarge, MissingExtra) as error:
+        return _modes_by_search(setup, measured.observation_model, goal, pose, kind, error.reason)
     moving = (
         not listed.found.complete
         and not as_written
         and any(
-            mode.configuration is not None and _moves(setting, measured.question, mode.configuration)
+            mode.configuration is not None and _moves(setup, measured.observation_model, mode.configuration)
             for mode in listed.modes
         )
     )
@@ -357,37 +360,41 @@ def _list_modes(
         "some of the solutions lie on a self-motion"
         if moving
         else "the equations depend on each other"
-        if listed.found.continuum is not None
-        else str(listed.found.degenerate)
+        if listed.found.continuous_family is not None
+        else str(listed.found.singular_solutions)
     )
-    found = _modes_by_search(setting, measured.question, goal, pose, kind, why)
-    return found if moving or not any(mode.proved for mode in listed.modes) else replace(listed, motions=found.motions)
+    found = _modes_by_search(setup, measured.observation_model, goal, pose, kind, why)
+    return (
+        found
+        if moving or not any(mode.proved for mode in listed.modes)
+        else replace(listed, self_motions=found.self_motions)
+    )
 
 
-def _modes_of_formation(setting: ObservedRobot, where: object, real: bool) -> AssemblyModes:
+def _modes_of_formation(setup: ObservedRobot, where: object, real: bool) -> AssemblyModes:
     """The modes of a formation; refuses poses and motors, which are those of one platform."""
     if where is not None or real:
         raise BadRequest(
-            f"{setting.robot.name}: poses and motors belong to one platform, and this is a formation",
+            f"{setup.robot.name}: poses and motors belong to one platform, and this is a formation",
             "real" if real else str(where),
             "nothing: what is measured at the file's configuration is held",
         )
-    tell("modes")
-    found, goal = formation_modes(setting), setting.everything.start
+    report("modes")
+    found, goal = formation_modes(setup), setup.all_samples.start
     system = SystemModes(
         found.complex,
         (),
         found.complete,
         found.proof,
-        degenerate=found.degenerate,
-        continuum=found.continuum,
+        singular_solutions=found.degenerate,
+        continuous_family=found.continuum,
         bound=found.bound,
     )
-    first = setting.samples.question.platform
+    first = setup.samples.observation_model.platform
     listed = list[AssemblyMode]()
     for each in found.modes:
         at = each.configuration
-        whole = Assembly(at, (), tuple(outside(at.twin, at.q)))
+        whole = Assembly(at, (), tuple(outside(at.model, at.q)))
         listed.append(
             AssemblyMode(
                 Pose.of(each.bodies[first]),
@@ -403,13 +410,13 @@ def _modes_of_formation(setting: ObservedRobot, where: object, real: bool) -> As
                 (),
                 at,
                 proved=found.complete,
-                length=goal.twin.length,
+                length=goal.model.length,
                 bodies=each.bodies,
                 opposite=each.opposite,
             )
         )
     return AssemblyModes(
-        setting,
+        setup,
         "formation",
         goal,
         Pose.of(goal.pose(first)),
@@ -424,7 +431,7 @@ def at_mode(listed: AssemblyModes | None, asked: ModeNumber) -> ClosedConfigurat
     """The robot assembled at one of its modes, its coordinates counted from the zero configuration; raises
     ``BadRequest``, ``PoseNotReached``."""
     assert listed is not None
-    name, count = listed.setting.robot.name, len(listed.modes)
+    name, count = listed.setup.robot.name, len(listed.modes)
     if not 1 <= asked.number <= count:
         raise BadRequest(
             f"{name}: a mode at {listed.pose}",
@@ -432,7 +439,7 @@ def at_mode(listed: AssemblyModes | None, asked: ModeNumber) -> ClosedConfigurat
             f"mode:1 to mode:{count}"
             if count
             else "no mode"
-            if listed.found.continuum is None
+            if listed.found.continuous_family is None
             else "poses that do not form a continuum",
         )
     mode = listed.modes[asked.number - 1]
@@ -446,41 +453,56 @@ def at_mode(listed: AssemblyModes | None, asked: ModeNumber) -> ClosedConfigurat
             str(listed.pose),
             reason=f"the robot was not found assembled there: {left} stayed open",
         )
-    return at if at.twin is listed.goal.twin else of_links(listed.goal.twin, at.pose)
+    return at if at.model is listed.goal.model else of_links(listed.goal.model, at.pose)
 
 
-def _moves(setting: ObservedRobot, question: Measurement, at: ClosedConfiguration) -> bool:
+def _moves(setup: ObservedRobot, observation_model: ObservationModel, at: ClosedConfiguration) -> bool:
     """Whether a closing lies on a self-motion that can be followed."""
-    return leaves_free(at, question) and self_motion(at, question, placing_links(setting.anatomy)) is not None
+    return (
+        leaves_free(at, observation_model)
+        and self_motion(at, observation_model, placing_links(setup.decomposition)) is not None
+    )
 
 
 def _modes_by_search(
-    setting: ObservedRobot, question: Measurement, goal: ClosedConfiguration, pose: Pose, kind: str, reason: str
+    setup: ObservedRobot,
+    observation_model: ObservationModel,
+    goal: ClosedConfiguration,
+    pose: Pose,
+    kind: str,
+    reason: str,
 ) -> AssemblyModes:
     """The modes that a search finds, and why there is no list that could be complete."""
-    done = search(goal, question, placing_links(setting.anatomy))
-    size = max((motion.dimension for motion in done.motions), default=None)
+    done = search(goal, observation_model, placing_links(setup.decomposition))
+    size = max((motion.dimension for motion in done.self_motions), default=None)
     found = SystemModes(
-        None, (), False, f"{done.words}; not counted: {reason}", degenerate=done.degenerate, continuum=size
+        None,
+        (),
+        False,
+        f"{done.words}; not counted: {reason}",
+        singular_solutions=done.degenerate,
+        continuous_family=size,
     )
     return AssemblyModes(
-        setting,
+        setup,
         kind,
         goal,
         pose,
         found,
-        tuple(_read_found(setting, question, mode, mode.configuration is goal) for mode in done.modes),
-        tuple(_read_found(setting, question, mode) for mode in done.near),
-        motions=done.motions,
+        tuple(_read_found(setup, observation_model, mode, mode.configuration is goal) for mode in done.modes),
+        tuple(_read_found(setup, observation_model, mode) for mode in done.near),
+        self_motions=done.self_motions,
     )
 
 
-def _read_found(setting: ObservedRobot, question: Measurement, mode: FoundMode, goal: bool = False) -> AssemblyMode:
-    return found_mode(setting, question, mode.configuration, mode.bodies, mode.residual, goal)
+def _read_found(
+    setup: ObservedRobot, observation_model: ObservationModel, mode: FoundMode, goal: bool = False
+) -> AssemblyMode:
+    return found_mode(setup, observation_model, mode.configuration, mode.bodies, mode.residual, goal)
 
 
 def _modes_by_system(
-    setting: ObservedRobot,
+    setup: ObservedRobot,
     measured: MeasuredRobot,
     goal: ClosedConfiguration,
     wanted: Task | None,
@@ -491,39 +513,41 @@ def _modes_by_system(
 ) -> AssemblyModes:
     """The modes as the solutions of the system that the tips' curves and surfaces give, or else of the conditions that
     the legs' joints give."""
-    reasons, large = list[NotConfined | Unsolved | TooLarge | MissingExtra](), None
+    reasons, large = list[UnsupportedLocus | SystemNotSolved | TooLarge | MissingExtra](), None
     answers = list[tuple[Model, SystemModes]]()
-    exact, better = drift(goal, wanted, setting.normal.moved), None
+    exact, better = drift(goal, wanted, setup.normal.moved), None
     free = without_couplings(measured, goal)
     tips, asked = partial(solve_tips, as_written=as_written, effort=effort), partial(solve_posed, effort=effort)
     first = (tips, asked, solve_loops) if free is None else (solve_loops, tips, asked)
     for listed in (*first, solve_carried, solve_loop):
         if better is not None and listed not in better:
             continue
-        if listed is not solve_loops and not setting.anatomy.decided:
-            reasons.append(NotConfined(setting.robot.name, "joints inside its platform allow several poses of it"))
+        if listed is not solve_loops and not setup.decomposition.decided:
+            reasons.append(UnsupportedLocus(setup.robot.name, "joints inside its platform allow several poses of it"))
             continue
         try:
             answers.append(listed(*((measured, goal) if free is None or listed is solve_loops else free), exact))
-        except (NotConfined, Unsolved, TooLarge, MissingExtra) as error:
+        except (UnsupportedLocus, SystemNotSolved, TooLarge, MissingExtra) as error:
             reasons.append(error)
-            large = error if listed is solve_loops and isinstance(error, Unsolved) else large
+            large = error if listed is solve_loops and isinstance(error, SystemNotSolved) else large
         else:
             if answers[-1][1].complete:
                 better = () if better else better_ways(answers[-1][0])
     if not answers:
         raise large or reasons[0]
     # what is measured leaves no freedom: a continuum is that of legs which tips alone do not show
-    made, found = max(answers, key=lambda each: (each[1].complete, each[1].continuum is None, not better_ways(each[0])))
+    made, found = max(
+        answers, key=lambda each: (each[1].complete, each[1].continuous_family is None, not better_ways(each[0]))
+    )
     if free is not None and made.closing is None:
         found = replace(found, proof=f"without couplings, which can only rule poses out: {found.proof}")
-    reader = ModeReader(setting, measured.question if free is None else free[0].question, goal, made)
+    reader = ModeReader(setup, measured.observation_model if free is None else free[0].observation_model, goal, made)
     at_goal = min(found.modes, key=reader.away, default=None)
     ordered = sorted(found.modes, key=lambda mode: mode is not at_goal)
     read = [reader.read(mode, mode is at_goal) for mode in ordered]
     near = [reader.read(mode, False) for mode in found.near if reader.away(mode) > SAME_NEAR_POSE]
     return AssemblyModes(
-        setting,
+        setup,
         kind,
         goal,
         pose,

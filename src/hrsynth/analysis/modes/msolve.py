@@ -19,7 +19,7 @@ from math import gcd
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...errors import MissingExtra, Unsolved
+from ...errors import MissingExtra, SystemNotSolved
 from .polynomials import Quadric
 
 if TYPE_CHECKING:
@@ -59,9 +59,9 @@ def parametrise(
             subprocess.run(command, capture_output=True, check=True, timeout=timeout)
             return read(target.read_text(encoding="ascii"), count)
         except subprocess.TimeoutExpired as error:
-            raise Unsolved("msolve", f"no answer within {timeout:g} s") from error
+            raise SystemNotSolved("msolve", f"no answer within {timeout:g} s") from error
         except (subprocess.CalledProcessError, OSError, ValueError) as error:
-            raise Unsolved("msolve", str(error)) from error
+            raise SystemNotSolved("msolve", str(error)) from error
 
 
 def executable() -> Path:

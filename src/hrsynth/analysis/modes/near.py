@@ -19,16 +19,16 @@ from ...geometry.vectors import Array
 from ...kinematics.assembly import of_links
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
-from ...kinematics.relation import Measurement, platform_motions, relation
-from ...kinematics.tasks import Held, shorten_step, solve
+from ...kinematics.tasks import FixedValuesTask, shorten_step, solve
+from ...kinematics.velocity_relation import ObservationModel, platform_motions, relation
 from ...options import plain_number
 from ...records import As, Recorded
 from ...results import Value
 from ...tolerances import CURVATURE_STEP, FAMILY_STEP, SAME_GEOMETRY, SAME_NEAR_POSE, SOLVED, SURELY_SOMETHING
-from ..accuracy.cones import single_angle
+from ..accuracy.measurement_bounds import single_angle
 from ..observed import ObservedRobot
 from .assembly_mode import AssemblyMode, found_mode
-from .motions import bodies_apart
+from .self_motions import bodies_apart
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -67,17 +67,19 @@ class StationaryPose(Value):
     family: bool
 
 
-def descend(start: ClosedConfiguration, question: Measurement, held: Held, bound: float) -> StationaryPose | None:
+def descend(
+    start: ClosedConfiguration, observation_model: ObservationModel, held: FixedValuesTask, bound: float
+) -> StationaryPose | None:
     """The stationary difference of what is held to which Gauss and Newton's method leads on the closed loops; None
     where it leads to none, or the loops open. Where the values leave a freedom, a family is a motion either way with
     differences up to ``bound`` (rad)."""
-    at, twin = start, start.twin
+    at, model = start, start.model
     error, motions, rates = _changes(at, held)
     for _ in range(NEAR_MODE_STEPS):
         step = motions @ np.linalg.lstsq(rates, -error, rcond=None)[0]
-        q, _ = solve(twin, twin.integrate(at.q, shorten_step(step, 0.5)), tolerance=SOLVED)
+        q, _ = solve(model, model.integrate(at.q, shorten_step(step, 0.5)), tolerance=SOLVED)
         try:
-            at = ClosedConfiguration.of(twin, q)
+            at = ClosedConfiguration.of(model, q)
         except LoopsNotClosed:
             return None
         error, motions, rates = _changes(at, held)
@@ -85,75 +87,80 @@ def descend(start: ClosedConfiguration, question: Measurement, held: Held, bound
             break
     else:
         return None
-    angle, there = _largest(error, held), relation(at, question)
+    angle, there = _largest(error, held), relation(at, observation_model)
     if there.rank == there.dof.value and there.seen.weakest >= SURELY_SOMETHING:
         return StationaryPose(at, angle, bool(_loop_rates(at, held, motions, rates).min(initial=1.0) > 0.0), False)
-    moving = platform_motions(at, question)
-    way = moving @ np.linalg.svd(held.rows(twin, at.q)[1] @ moving)[2][-1]
+    moving = platform_motions(at, observation_model)
+    way = moving @ np.linalg.svd(held.error_and_jacobian(model, at.q)[1] @ moving)[2][-1]
     beside = (
-        solve(twin, twin.integrate(at.q, step * way), tolerance=SOLVED)[0] for step in (FAMILY_STEP, -FAMILY_STEP)
+        solve(model, model.integrate(at.q, step * way), tolerance=SOLVED)[0] for step in (FAMILY_STEP, -FAMILY_STEP)
     )
-    return StationaryPose(at, angle, False, all(_largest(held.rows(twin, q)[0], held) <= bound for q in beside))
+    return StationaryPose(
+        at, angle, False, all(_largest(held.error_and_jacobian(model, q)[0], held) <= bound for q in beside)
+    )
 
 
-def _largest(error: Array, held: Held) -> float:
+def _largest(error: Array, held: FixedValuesTask) -> float:
     """The largest angle (rad) of the differences of what is held, one below the other (rows,)."""
     parts = np.split(error, np.cumsum([o.size for o, _ in held.measured])[:-1])
     return 2 * float(np.arcsin(min(1.0, max((float(np.linalg.norm(part)) for part in parts), default=0.0) / 2)))
 
 
-def _changes(at: ClosedConfiguration, held: Held) -> tuple[Array, Array, Array]:
+def _changes(at: ClosedConfiguration, held: FixedValuesTask) -> tuple[Array, Array, Array]:
     """How far what is held is off (rows,), the motions of the loops (nv, k) that change it, and its rates (rows, k)."""
-    error, rates = held.rows(at.twin, at.q)
+    error, rates = held.error_and_jacobian(at.model, at.q)
     kernel = at.kernel()[0]
     _, sizes, ways = np.linalg.svd(rates @ kernel, full_matrices=False)
     motions = kernel @ ways[sizes > SURELY_SOMETHING].T
     return error, motions, rates @ motions
 
 
-def _loop_rates(at: ClosedConfiguration, held: Held, motions: Array, rates: Array) -> Array:
+def _loop_rates(at: ClosedConfiguration, held: FixedValuesTask, motions: Array, rates: Array) -> Array:
     """The eigenvalues of (JᵀJ)⁻¹ H, H the Hessian of ½ ‖e‖² along motions, J the rates of e: by differences of the
     slope, of which the part beside JᵀJ is of the size of e."""
-    twin = at.twin
+    model = at.model
     bends = np.zeros((motions.shape[1],) * 2)
     for k, way in enumerate(motions.T):
         for sign in (1.0, -1.0):
-            q, _ = solve(twin, twin.integrate(at.q, sign * CURVATURE_STEP * way), tolerance=SOLVED)
-            J = twin.jacobian(q)
-            error, slopes = held.rows(twin, q)
+            q, _ = solve(model, model.integrate(at.q, sign * CURVATURE_STEP * way), tolerance=SOLVED)
+            J = model.jacobian(q)
+            error, slopes = held.error_and_jacobian(model, q)
             carried = motions - np.linalg.pinv(J, rcond=SURELY_SOMETHING) @ (J @ motions)
             bends[k] += sign * (error @ slopes @ carried) / (2 * CURVATURE_STEP)
     return np.asarray(np.sort(np.linalg.eigvals(np.linalg.solve(rates.T @ rates, (bends + bends.T) / 2)).real))
 
 
 def near_modes(
-    setting: ObservedRobot,
+    setup: ObservedRobot,
     goal: ClosedConfiguration,
-    question: Measurement,
+    observation_model: ObservationModel,
     known: Sequence[AssemblyMode],
     candidates: Sequence[AssemblyMode],
     bound: float,
 ) -> tuple[NearMode, ...]:
     """The near modes with differences up to ``bound`` (rad) to which candidates lead, those of least difference first:
     isolated minima, none of them the goal or a ``known`` mode, and one of those that are connected."""
-    held, found = Held.at(goal.twin, goal.q, question.reference, question.observations), list[NearMode]()
+    held, found = (
+        FixedValuesTask.at(goal.model, goal.q, observation_model.reference, observation_model.observations),
+        list[NearMode](),
+    )
     for mode in candidates if bound else ():
-        near = _near(setting, goal, question, held, mode, bound)
+        near = _near(setup, goal, observation_model, held, mode, bound)
         if near is None or near.angle > bound:
             continue
         bodies = near.bodies or {}
         others = [{body: goal.pose(body) for body in bodies}, *(each.bodies or {} for each in (*known, *found))]
-        if all(bodies_apart(bodies, other, question, goal.twin.length) > SAME_NEAR_POSE for other in others):
+        if all(bodies_apart(bodies, other, observation_model, goal.model.length) > SAME_NEAR_POSE for other in others):
             found.append(near)
     families = [each for each in found if each.family]
     return tuple(sorted((each for each in found if each not in families[1:]), key=lambda each: each.angle))
 
 
 def _near(
-    setting: ObservedRobot,
+    setup: ObservedRobot,
     goal: ClosedConfiguration,
-    question: Measurement,
-    held: Held,
+    observation_model: ObservationModel,
+    held: FixedValuesTask,
     mode: AssemblyMode,
     bound: float,
 ) -> NearMode | None:
@@ -161,15 +168,17 @@ def _near(
     angle, stable, family = mode.residual, None, False
     if mode.configuration is not None:
         try:
-            start = of_links(goal.twin, mode.configuration.pose)
+            start = of_links(goal.model, mode.configuration.pose)
         except LoopsNotClosed:
             return None
-        least = descend(start, question, held, bound)
+        least = descend(start, observation_model, held, bound)
         if least is None or not (least.isolated or least.family):
             return None
         at, angle, stable, family = least.configuration, least.angle, least.isolated or None, least.family
-        mode = found_mode(setting, question, at, {body: at.pose(body) for body in mode.bodies or {}}, mode.residual)
-    distance, turned = distance_from(setting.motion, goal, mode)
+        mode = found_mode(
+            setup, observation_model, at, {body: at.pose(body) for body in mode.bodies or {}}, mode.residual
+        )
+    distance, turned = distance_from(setup.motion, goal, mode)
     return NearMode(
         **{each.name: getattr(mode, each.name) for each in fields(AssemblyMode)},
         angle=angle,

@@ -19,8 +19,8 @@ from ...geometry.vectors import Array, plane_axes, pose, rotation_about
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.tasks import solve as close
 from ...tolerances import NUMBER_ROUNDING, SOLVED
-from .multiples import Residues, bezout, partitions
-from .systems import System
+from .constrained_platform import System
+from .modular_root_bound import Residues, bezout, partitions
 
 Exponents = tuple[int, ...]
 Sum = dict[tuple[int, Exponents], complex]
@@ -145,7 +145,7 @@ class PlanarLoops(System):
     @property
     def size(self) -> float:
         """The unit of lengths (m)."""
-        return self.goal.twin.length
+        return self.goal.model.length
 
     @property
     def slack(self) -> float:
@@ -199,9 +199,9 @@ class PlanarLoops(System):
 
     def closing(self, q: Array) -> ClosedConfiguration:
         """The whole mechanism there, gears on the teeth on which they are at the goal."""
-        twin, step = self.goal.twin, np.zeros(self.goal.twin.nv)
-        for joint in twin.mechanism.joints.values():
-            (place,) = twin.coordinates[joint.name]
+        model, step = self.goal.model, np.zeros(self.goal.model.nv)
+        for joint in model.mechanism.joints.values():
+            (place,) = model.coordinates[joint.name]
             if joint.type.slides:
                 k, factor = self.moves[joint.name]
                 step[place] = 0.0 if k < 0 else factor * q[self.angles + k]
@@ -209,11 +209,11 @@ class PlanarLoops(System):
                 E = np.subtract(self.turns[joint.successor], self.turns[joint.predecessor])
                 axis = (
                     self.goal.pose(joint.predecessor)[:3, :3]
-                    @ twin.mechanism.links[joint.predecessor].inverse[:3, :3]
+                    @ model.mechanism.links[joint.predecessor].inverse[:3, :3]
                     @ joint.axis
                 )
                 step[place] = float(E @ q[: self.angles]) * np.sign(axis @ self.normal)
-        return ClosedConfiguration.of(twin, close(twin, twin.integrate(self.goal.q, step), tolerance=SOLVED)[0])
+        return ClosedConfiguration.of(model, close(model, model.integrate(self.goal.q, step), tolerance=SOLVED)[0])
 
     def pose_terms(self, x: Sequence[Any]) -> list[Any]:
         """What tells the pose of the bodies, each with its conjugate, at balls (cos ψ, sin ψ, t)."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...budgets import LARGEST_LOOPS, LOOP_SYSTEMS, PLANAR_STARTS
-from ...errors import Unsolved
+from ...errors import SystemNotSolved
 from ...geometry.vectors import Array, frozen
 from ...kinematics.configuration import ClosedConfiguration
 from ..measured import MeasuredRobot
@@ -29,7 +29,7 @@ def proposals(forms: Sequence[dict[Exponents, complex]], angles: int, enough: in
     M = np.array(monomials, dtype=float)
     C = np.array([[form.get(e, 0j) for e in monomials] for form in forms])
     rng, found = np.random.default_rng(0), np.zeros((0, M.shape[1]), dtype=complex)
-    twin = [*range(angles, 2 * angles), *range(angles), *range(2 * angles, M.shape[1])]
+    model = [*range(angles, 2 * angles), *range(angles), *range(2 * angles, M.shape[1])]
     for _ in range(PLANAR_STARTS):
         x = rng.normal(size=(64, M.shape[1])) + 1j * rng.normal(size=(64, M.shape[1]))
         x[:, angles : 2 * angles] = 1.0 / x[:, :angles]
@@ -48,7 +48,7 @@ def proposals(forms: Sequence[dict[Exponents, complex]], angles: int, enough: in
                 x[x == 0] = 1e-200
             close_ = np.abs(step).max(axis=1) < 1e-10 * (1.0 + np.abs(x).max(axis=1))
         for each in x[close_]:
-            for y in (each, each[twin].conj()):
+            for y in (each, each[model].conj()):
                 if len(found) < enough and not np.any(
                     np.abs(found - y).max(axis=1, initial=0.0) < 1e-6 * (1.0 + np.abs(y).max())
                 ):
@@ -59,18 +59,18 @@ def proposals(forms: Sequence[dict[Exponents, complex]], angles: int, enough: in
 
 
 def solve_loops(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0) -> tuple[Model, SystemModes]:
-    """All modes, with the goal known to ``error`` (m). Raises ``NotConfined``, and ``Unsolved`` where not all closings
-    are enclosed that there may be."""
-    refused = list[Unsolved]()
+    """All modes, with the goal known to ``error`` (m). Raises ``UnsupportedLocus``, and ``Unsolved`` where not all
+    closings are enclosed that there may be."""
+    refused = list[SystemNotSolved]()
     for system in islice(systems(measured, goal), LOOP_SYSTEMS):
         system = replace(system, error=system.error + error)
         try:
             found = _judge(system)
-        except Unsolved as unsolved:
+        except SystemNotSolved as unsolved:
             refused.append(unsolved)
         else:
             # without couplings not all loops need be among those
-            closing = system.closing if goal.twin.mechanism.couplings else None
+            closing = system.closing if goal.model.mechanism.couplings else None
             return Model(system, system.body_poses, system.home, closing=closing), found
     raise refused[0]
 
@@ -84,21 +84,21 @@ def _judge(system: PlanarLoops) -> SystemModes:
     size = f"{loops}, {angles} and {slides}"
     most, why, bound = system.most, "degrees in groups of unknowns (Bézout)", "class"
     if most > LARGEST_LOOPS:
-        raise Unsolved("the loops", f"{size}: up to {most} closings, too many (at most {LARGEST_LOOPS})")
+        raise SystemNotSolved("the loops", f"{size}: up to {most} closings, too many (at most {LARGEST_LOOPS})")
     boxes, lost = _enclose(system, proposals(system.forms, system.angles, most))
     if len(boxes) < most and (fewer := system.residues.most_by_ranks(len(boxes))) is not None and fewer < most:
         most, why, bound = fewer, "ranks modulo a prime of 62 bits", "rank"
     start = np.array([1.0] * system.angles + [0.0] * (system.angles + system.slides))
     at_goal = [box for box in boxes if box.real and box.holds(start)]
     if len(boxes) < most or lost or len(at_goal) != 1:
-        raise Unsolved("the loops", f"{size}: of {most} closings at most ({why}) {len(boxes)} have boxes")
+        raise SystemNotSolved("the loops", f"{size}: of {most} closings at most ({why}) {len(boxes)} have boxes")
     seen = [system.pose_terms(_balls(box)) for box in boxes]
     if any(
         all((a - b).contains(0) for a, b in zip(one, other, strict=True))
         for k, one in enumerate(seen)
         for other in seen[:k]
     ):
-        raise Unsolved("the loops", f"{size}: several of {most} closings have one pose of the platform")
+        raise SystemNotSolved("the loops", f"{size}: several of {most} closings have one pose of the platform")
     real = [box for box in boxes if box.real]
     proof = (
         f"{size}: at most {most} closings by {why}, {len(boxes)} enclosed apart from each other, complex ones "
@@ -166,5 +166,5 @@ def _mode(system: PlanarLoops, box: PoseBox, proved: bool) -> SystemMode:
         frozen(system.pose_of(system.bodies[0], q)),
         frozen(q),
         proved=proved,
-        fits=not proved,
+        match_residual=not proved,
     )

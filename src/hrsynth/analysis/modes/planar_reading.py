@@ -12,7 +12,7 @@ import numpy as np
 
 from ...budgets import LARGEST_GEAR
 from ...constraints.pattern import placing_links
-from ...errors import NotConfined
+from ...errors import UnsupportedLocus
 from ...geometry.vectors import Array, cross, plane_axes, transform
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism import Joint, JointType, Observation, graphs
@@ -26,15 +26,15 @@ KINDS = (JointType.REVOLUTE, JointType.PRISMATIC)
 
 
 def planar_loops(measured: MeasuredRobot, goal: ClosedConfiguration) -> PlanarLoops:
-    """The mechanism with the measurements at a configuration. Raises ``NotConfined`` where it is not planar, or what is
-    measured are not directions and joints' coordinates, as many as it has freedoms."""
+    """The mechanism with the measurements at a configuration. Raises ``UnsupportedLocus`` where it is not planar, or
+    what is measured are not directions and joints' coordinates, as many as it has freedoms."""
     return next(systems(measured, goal))
 
 
 def systems(measured: MeasuredRobot, goal: ClosedConfiguration) -> Iterator[PlanarLoops]:
     """The mechanism, with more and more left to be measured besides; last where loops that are left out ask more than
-    their own unknowns can meet, so that closings of the others need not be closings. Raises ``NotConfined``."""
-    seen, reason, tight, looser = measured.question.observations, "", False, list[PlanarLoops]()
+    their own unknowns can meet, so that closings of the others need not be closings. Raises ``UnsupportedLocus``."""
+    seen, reason, tight, looser = measured.observation_model.observations, "", False, list[PlanarLoops]()
     for size in range(len(seen), 0, -1):
         for chosen in combinations(seen, size):
             reading = _Reading(measured, goal, chosen)
@@ -50,17 +50,17 @@ def systems(measured: MeasuredRobot, goal: ClosedConfiguration) -> Iterator[Plan
                 yield found
     yield from looser[:1]
     if not tight and not looser:
-        raise NotConfined(goal.twin.mechanism.name, reason)
+        raise UnsupportedLocus(goal.model.mechanism.name, reason)
 
 
 class _Reading:
     """A mechanism's joints, in its plane."""
 
     def __init__(self, measured: MeasuredRobot, goal: ClosedConfiguration, seen: Sequence[Observation]) -> None:
-        anatomy = measured.setting.anatomy
-        self.mechanism, self.goal, self.seen = goal.twin.mechanism, goal, seen
-        self.reference = measured.question.reference
-        self.bodies, self.point = placing_links(anatomy), anatomy.point
+        decomposition = measured.setup.decomposition
+        self.mechanism, self.goal, self.seen = goal.model.mechanism, goal, seen
+        self.reference = measured.observation_model.reference
+        self.bodies, self.point = placing_links(decomposition), decomposition.point
         self.joints = list(self.mechanism.joints.values())
         self.axes = {
             joint.name: self._displacement(joint.predecessor)[:3, :3] @ joint.axis
@@ -72,15 +72,15 @@ class _Reading:
             along = abs(float(self.axes.get(joint.name, np.zeros(3)) @ self.normal))
             if joint.type not in KINDS or abs(along - (not joint.type.slides)) > SAME_DIRECTION:
                 raise self._refuse(f"joint {joint.name} is not one of a planar mechanism")
-        self.frame = plane_axes(self.normal) / goal.twin.length
+        self.frame = plane_axes(self.normal) / goal.model.length
         self.middle = np.mean([self._centre(joint) for joint in self.joints], axis=0)
         self.places = {link: i for i, link in enumerate(self.mechanism.links)}
         self.dropped = 0.0
         self.more = False
         """Whether the loops that are left out ask more than their own unknowns can meet."""
 
-    def _refuse(self, reason: str) -> NotConfined:
-        return NotConfined(self.mechanism.name, reason)
+    def _refuse(self, reason: str) -> UnsupportedLocus:
+        return UnsupportedLocus(self.mechanism.name, reason)
 
     def _displacement(self, link: str) -> Array:
         """How a link is displaced at the goal since zero (4, 4)."""
@@ -158,7 +158,7 @@ class _Reading:
             self.bodies,
             self.point,
             whole[2],
-            error=self.dropped * self.goal.twin.length,
+            error=self.dropped * self.goal.model.length,
         )
         return min(found, replace(found, loops=whole[1]), key=lambda each: each.most)
 
@@ -289,7 +289,7 @@ class _Reading:
         """By how much the successor's origin is shifted more than the predecessor's."""
         if joint.type.slides:
             k, factor = moves[joint.name]
-            along = factor * complex(*(self.frame @ self.axes[joint.name] * self.goal.twin.length))
+            along = factor * complex(*(self.frame @ self.axes[joint.name] * self.goal.model.length))
             return {} if k < 0 else {(k, turns[joint.predecessor]): along}
         centre = self._flat(self._centre(joint))
         return self._sum({(-1, turns[joint.predecessor]): centre}, {(-1, turns[joint.successor]): centre}, -1)

@@ -197,9 +197,9 @@ def enclose_poses(
             if lost and len(found) + len(proposed[0]) - number < needed:
                 break
             real = bool(np.abs(x.imag).max() < NEARLY_REAL_POSE)
-            twin = None if real else at_middle([box for box in found if not box.real], x.conj())
-            if twin is not None:
-                each: PoseBox | None = replace(twin, middle=twin.middle.conj())
+            model = None if real else at_middle([box for box in found if not box.real], x.conj())
+            if model is not None:
+                each: PoseBox | None = replace(model, middle=model.middle.conj())
             elif np.all(np.isfinite(x)):
                 start = [arb(v) for v in x.real.tolist()] if real else [acb(v.real, v.imag) for v in x.tolist()]
                 each = as_box(krawczyk(equations, start), real, turned)

@@ -22,7 +22,7 @@ import numpy as np
 
 from ...geometry.vectors import Array, cross, plane_axes
 from ...tolerances import PARALLEL
-from .curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, length
+from .loci import Circle, Curve, Line, Plane, Point, Reach, Sphere, length
 from .polynomials import Quadric
 
 BITS = 52

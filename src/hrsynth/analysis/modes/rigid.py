@@ -16,7 +16,8 @@ from ...errors import BadRequest
 from ...geometry.so3 import exponential, logarithm
 from ...geometry.vectors import Array, cross, pose
 from ...tolerances import SAME_DIRECTION, SAME_POINT
-from .curves import Circle, Curve, Line, Point, Surface, curves_of, extent, length
+from .constrained_platform import System, register
+from .loci import Circle, Curve, Line, Point, Surface, curves_of, extent, length
 from .polynomials import Equation
 from .quadrics import (
     Conic,
@@ -32,9 +33,8 @@ from .quadrics import (
     shifting,
     spatial_frame,
 )
-from .squares import SquareSystem, resting, single
-from .study import study
-from .systems import System, register
+from .square_systems import SquareSystem, resting, single
+from .study_coordinates import study
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from ...tolerances import FARTHEST, NEARLY_DOUBLE, RANK_GAP, SHARP_ROOT
-from .curves import Circle, Curve
+from .loci import Circle, Curve
 from .polynomials import Eliminant, Equation, Polynomial, cycle, height, krawczyk, pair, primitive, univariate, without
 from .quadrics import UNIT, Balls, Conic, Within, WorkingFrame, parameter
-from .squares import SquareSystem
+from .square_systems import SquareSystem
 
 if TYPE_CHECKING:
     from flint import fmpz_poly
@@ -46,7 +46,7 @@ LOUD = 1 << 16
 
 
 @dataclass(frozen=True, eq=False)
-class Root:
+class RealSolution:
     """A real solution: balls of the curves' parameters (m, rad), how far each curve's point, of the exact input, can be
     from that at the middle of the parameter (m), its multiplicity.
 
@@ -63,7 +63,7 @@ class Root:
 
 
 @dataclass(frozen=True, eq=False)
-class Roots:
+class SolutionSet:
     """All solutions of a square system; ``complex`` counts them with multiplicity.
 
     ``degree`` is that of the polynomial that was isolated, ``extraneous`` how many roots of it lie at infinity.
@@ -71,7 +71,7 @@ class Roots:
     """
 
     complex: int = 0
-    real: tuple[Root, ...] = ()
+    real: tuple[RealSolution, ...] = ()
     degree: int = 0
     extraneous: int = 0
     complete: bool = True
@@ -94,14 +94,14 @@ class Roots:
     """Where circles are counted from (rad), besides each unknown's own origin."""
 
 
-def solve_square(square: SquareSystem, balls: Within = Balls, farthest: float = FARTHEST) -> Roots:
+def solve_square(square: SquareSystem, balls: Within = Balls, farthest: float = FARTHEST) -> SolutionSet:
     """All solutions of a square system: those of the rounded input counted, those of all in the balls enclosed; those
     beyond the distance ``farthest`` (sizes) are taken to be at infinity."""
     from flint import ctx
 
     if not square.unknowns:
-        return Roots(1, (Root((), (), 1, True, True),))
-    fallback = Roots(complete=False)
+        return SolutionSet(1, (RealSolution((), (), 1, True, True),))
+    fallback = SolutionSet(complete=False)
     for turn in STARTS:
         equations = square.equations(turn)
         with ctx.workprec(PRECISION):
@@ -118,7 +118,7 @@ def solve_square(square: SquareSystem, balls: Within = Balls, farthest: float = 
                 return replace(found, turn=turn)
             fallback = max(fallback, found, key=lambda each: each.complex)
         if zeros == max(1, len(square.unknowns)):
-            return Roots(complete=False, continuum=True)
+            return SolutionSet(complete=False, continuum=True)
     return fallback
 
 
@@ -159,7 +159,7 @@ def _vanishes(polynomial: fmpz_poly, noisy: fmpz_poly) -> bool:
     return not polynomial or height(polynomial - noisy) * LOUD > height(polynomial)
 
 
-def _roots(square: _Enclosing, order: tuple[int, ...], eliminant: Eliminant, farthest: float) -> Roots:
+def _roots(square: _Enclosing, order: tuple[int, ...], eliminant: Eliminant, farthest: float) -> SolutionSet:
     """The solutions over the roots of an eliminant."""
     from flint import ctx, fmpz_poly
 
@@ -275,7 +275,7 @@ class Enclosing(ABC):
         """How far the points at balls of the parameters ``own`` and of the unknowns are from those at the middle
         (m)."""
 
-    def all_of(self, solutions: Sequence[Solution], degree: int, farthest: float) -> Roots:
+    def all_of(self, solutions: Sequence[Solution], degree: int, farthest: float) -> SolutionSet:
         """All solutions together, the real ones enclosed, without those beyond ``farthest`` (sizes); complete if each
         root of ``degree`` has its solution and each real one is enclosed or multiple."""
         from flint import ctx
@@ -288,7 +288,7 @@ class Enclosing(ABC):
         near = set(map(id, values))
         distant = tuple(values for values, _ in solutions if id(values) not in near)
         proved = all(root.real and (root.unique or root.multiplicity > 1) for root in real)
-        return Roots(
+        return SolutionSet(
             count,
             real,
             degree - far,
@@ -301,21 +301,21 @@ class Enclosing(ABC):
             distant=distant,
         )
 
-    def _enclose(self, start: Sequence[Any], multiplicity: int) -> Root:
+    def _enclose(self, start: Sequence[Any], multiplicity: int) -> RealSolution:
         """The box of a real solution: for the exact input where that can be proved, else for the rounded one."""
         for each in (self.thick, self.equations):
             box = krawczyk(each, start)
             if box is not None:
                 own = self.parameters(box)
-                return Root(own, self.misses(own, box), 1, True, each is self.thick)
+                return RealSolution(own, self.misses(own, box), 1, True, each is self.thick)
         own = self.parameters(start)
-        return Root(own, self.misses(own, start), multiplicity, False, False)
+        return RealSolution(own, self.misses(own, start), multiplicity, False, False)
 
-    def _middle(self, values: Sequence[Any]) -> Root:
+    def _middle(self, values: Sequence[Any]) -> RealSolution:
         """The real part of a conjugate pair, and how far its points are from there at most."""
         own = self.parameters([v.real.mid() for v in values])
         wide = [v.real + v.imag.union(-v.imag) for v in values]
-        return Root(own, self.misses(own, wide), 2, False, False, False)
+        return RealSolution(own, self.misses(own, wide), 2, False, False, False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -410,6 +410,6 @@ def _closest(solutions: Sequence[Sequence[Any]]) -> float:
     return float((apart.max(axis=2) + np.diag([np.inf] * len(values))).min())
 
 
-def nearly_double(roots: Roots) -> bool:
+def nearly_double(roots: SolutionSet) -> bool:
     """Whether two solutions coincide, or nearly: the pose is singular."""
     return roots.closest < NEARLY_DOUBLE or any(root.multiplicity > 1 for root in roots.real)

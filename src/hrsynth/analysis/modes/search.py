@@ -12,16 +12,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...budgets import SEARCH_ITERATIONS, SEARCH_MOTIONS, SEARCH_QUIET, SEARCH_STARTS
-from ...errors import NotMeasured
+from ...errors import UndefinedValue
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.limits import outside
 from ...kinematics.pinocchio_model import PinocchioModel
-from ...kinematics.relation import Measurement, relation
-from ...kinematics.tasks import Held, solve
-from ...progress import tell
+from ...kinematics.tasks import FixedValuesTask, solve
+from ...kinematics.velocity_relation import ObservationModel, relation
+from ...progress import report
 from ...tolerances import CLOSED, NEAR_MODE, SAME_RELATION, SOLVED, SURELY_SOMETHING
-from .motions import SelfMotion, bodies_apart, self_motion
+from .self_motions import SelfMotion, bodies_apart, self_motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,7 @@ class ModeSearch:
     how many of those ended elsewhere where the measurements leave the platform a freedom (``loose``)."""
 
     modes: tuple[FoundMode, ...]
-    motions: tuple[SelfMotion, ...]
+    self_motions: tuple[SelfMotion, ...]
     starts: int
     closed: int
     loose: int
@@ -52,9 +52,9 @@ class ModeSearch:
     @property
     def words(self) -> str:
         """What was done, and how well it covers."""
-        once = sum(mode.met == 1 for mode in self.modes[0 if any(motion.goal for motion in self.motions) else 1 :])
+        once = sum(mode.met == 1 for mode in self.modes[0 if any(motion.goal for motion in self.self_motions) else 1 :])
         rare = "" if not once else f"; {once} of the modes {'was' if once == 1 else 'were'} met only once"
-        moving = sum(motion.met for motion in self.motions)
+        moving = sum(motion.hits for motion in self.self_motions)
         on = f", {moving} of them on self-motions" if moving else ""
         return f"found from {self.starts} random starts of the whole robot, of which {self.closed} closed{on}{rare}"
 
@@ -69,80 +69,87 @@ class ModeSearch:
         )
 
 
-def search(goal: ClosedConfiguration, question: Measurement, bodies: Sequence[str]) -> ModeSearch:
+def search(goal: ClosedConfiguration, observation_model: ObservationModel, bodies: Sequence[str]) -> ModeSearch:
     """All closings with the measurements at the goal that random starts lead to, each pose of the bodies once; of the
     closings at one pose the first within the joints' limits, where there is one. From closings at which the platform
     is free, self-motions are followed."""
-    twin, rng = goal.twin, np.random.default_rng(0)
-    held = Held.at(twin, goal.q, question.reference, question.observations)
-    own = self_motion(goal, question, bodies, goal=True) if leaves_free(goal, question) else None
+    model, rng = goal.model, np.random.default_rng(0)
+    held = FixedValuesTask.at(model, goal.q, observation_model.reference, observation_model.observations)
+    own = self_motion(goal, observation_model, bodies, goal=True) if leaves_free(goal, observation_model) else None
     found = [FoundMode(goal, _poses(goal, bodies), goal.residual, 1)] if own is None else []
     motions = [] if own is None else [own]
     starts = closed = loose = quiet = 0
     near = list[FoundMode]()
     while starts < SEARCH_STARTS and quiet < SEARCH_QUIET:
         number, starts = starts, starts + 1
-        tell("starts")
+        report("starts")
         far = np.pi if number % 2 else rng.uniform(0.0, np.pi)
-        start = twin.integrate(twin.q0, rng.uniform(-far, far, twin.nv))
+        start = model.integrate(model.q0, rng.uniform(-far, far, model.nv))
         try:
-            q, residual = solve(twin, start, held, tolerance=SOLVED, iterations=SEARCH_ITERATIONS)
-        except NotMeasured:  # on the way a point came to a camera's centre
+            q, residual = solve(model, start, held, tolerance=SOLVED, iterations=SEARCH_ITERATIONS)
+        except UndefinedValue:  # on the way a point came to a camera's centre
             continue
         if residual > CLOSED:
             if residual <= NEAR_MODE:
-                _add_near(near, twin, q, residual, bodies, question)
+                _add_near(near, model, q, residual, bodies, observation_model)
             continue
         closed, quiet = closed + 1, quiet + 1
-        at = ClosedConfiguration.of(twin, q)
+        at = ClosedConfiguration.of(model, q)
         poses = _poses(at, bodies)
         known = next(
             (
                 k
                 for k, mode in enumerate(found)
-                if bodies_apart(mode.bodies, poses, question, twin.length) <= SAME_RELATION
+                if bodies_apart(mode.bodies, poses, observation_model, model.length) <= SAME_RELATION
             ),
             None,
         )
         if known is not None:
             mode = found[known]
-            better = mode.configuration is not goal and outside(twin, mode.configuration.q) and not outside(twin, q)
+            better = mode.configuration is not goal and outside(model, mode.configuration.q) and not outside(model, q)
             found[known] = FoundMode(at if better else mode.configuration, mode.bodies, mode.residual, mode.met + 1)
-        elif not leaves_free(at, question):
+        elif not leaves_free(at, observation_model):
             found.append(FoundMode(at, poses, residual, 1))
             quiet = 0
-        elif (on := next((k for k, motion in enumerate(motions) if motion.passes(at, question)), None)) is not None:
-            motions[on] = replace(motions[on], met=motions[on].met + 1)
+        elif (
+            on := next((k for k, motion in enumerate(motions) if motion.passes(at, observation_model)), None)
+        ) is not None:
+            motions[on] = replace(motions[on], hits=motions[on].hits + 1)
         else:
-            motion = self_motion(at, question, bodies, motions) if len(motions) < SEARCH_MOTIONS else None
+            motion = self_motion(at, observation_model, bodies, motions) if len(motions) < SEARCH_MOTIONS else None
             if motion is None:
                 loose += 1
             elif motion in motions:
                 on = motions.index(motion)
-                motions[on] = replace(motion, met=motion.met + 1)
+                motions[on] = replace(motion, hits=motion.hits + 1)
             else:
-                motions.append(replace(motion, met=1))
+                motions.append(replace(motion, hits=1))
                 quiet = 0
     return ModeSearch(tuple(found), tuple(motions), starts, closed, loose, tuple(near))
 
 
 def _add_near(
-    near: list[FoundMode], twin: PinocchioModel, q: Array, residual: float, bodies: Sequence[str], question: Measurement
+    near: list[FoundMode],
+    model: PinocchioModel,
+    q: Array,
+    residual: float,
+    bodies: Sequence[str],
+    observation_model: ObservationModel,
 ) -> None:
     """Close the loops where a start ended that met loops and measurements nearly, and add that pose if it is new."""
-    q, left = solve(twin, q, tolerance=SOLVED)
+    q, left = solve(model, q, tolerance=SOLVED)
     if left > CLOSED:
         return
-    at = ClosedConfiguration.of(twin, q)
+    at = ClosedConfiguration.of(model, q)
     poses = _poses(at, bodies)
-    if all(bodies_apart(each.bodies, poses, question, twin.length) > NEAR_MODE for each in near):
+    if all(bodies_apart(each.bodies, poses, observation_model, model.length) > NEAR_MODE for each in near):
         near.append(FoundMode(at, poses, residual, 1))
 
 
-def leaves_free(at: ClosedConfiguration, question: Measurement) -> bool:
+def leaves_free(at: ClosedConfiguration, observation_model: ObservationModel) -> bool:
     """Whether the measurements leave the platform a freedom, to first order or nearly: then closings to rounding lie
     about one that are none."""
-    there = relation(at, question)
+    there = relation(at, observation_model)
     return there.rank < there.dof.value or there.seen.weakest < SURELY_SOMETHING
 
 

@@ -16,21 +16,21 @@ from typing import Any
 import numpy as np
 
 from ...constraints.pattern import leg_ends
-from ...errors import NotConfined, Unsolved
+from ...errors import SystemNotSolved, UnsupportedLocus
 from ...geometry.vectors import Array, pose_difference
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.relation import Measurement
-from ...kinematics.tasks import Held
+from ...kinematics.tasks import FixedValuesTask
 from ...kinematics.tasks import solve as close
+from ...kinematics.velocity_relation import ObservationModel
 from ...mechanism import Direction
 from ...mechanism.observations.encoder import Encoder
 from ...tolerances import INDEPENDENT_RATES, NUMBER_ROUNDING, SOLVED
 from ..measured import MeasuredRobot
 from .branches import Model
-from .carried import CarriedPlatform, Turn
-from .carried_modes import as_mode
-from .carrier import freedoms_of
-from .leg_conditions import Middle
+from .carrying_leg import freedoms_of
+from .carrying_leg_modes import as_mode
+from .carrying_leg_system import CarriedPlatform, Turn
+from .leg_conditions import OriginAndUnit
 from .pose_boxes import PRECISION, PoseBox, as_box, zeros
 from .solve import SystemMode, SystemModes
 
@@ -47,7 +47,7 @@ class SingleLoop(CarriedPlatform):
     before: int
     body: str
     goal: ClosedConfiguration
-    question: Measurement
+    observation_model: ObservationModel
     places: tuple[tuple[int, int], ...]
     """The coordinate of each in the whole robot, and its sense."""
 
@@ -58,12 +58,14 @@ class SingleLoop(CarriedPlatform):
 
     def close(self, q: Array) -> tuple[ClosedConfiguration, float]:
         """The robot closed from there on with what is measured held, and what is left of that."""
-        twin, step = self.goal.twin, np.zeros(self.goal.twin.nv)
+        model, step = self.goal.model, np.zeros(self.goal.model.nv)
         for (place, sense), value in zip(self.places, q, strict=True):
             step[place] = sense * float(value)  # slides are in characteristic lengths there too
-        held = Held.at(twin, self.goal.q, self.question.reference, self.question.observations)
-        found, residual = close(twin, twin.integrate(self.goal.q, step), held, tolerance=SOLVED)
-        return ClosedConfiguration.of(twin, found), residual
+        held = FixedValuesTask.at(
+            model, self.goal.q, self.observation_model.reference, self.observation_model.observations
+        )
+        found, residual = close(model, model.integrate(self.goal.q, step), held, tolerance=SOLVED)
+        return ClosedConfiguration.of(model, found), residual
 
     def axes(self) -> list[Any]:
         """h of each, in balls; shape (8,)."""
@@ -102,25 +104,25 @@ _Place = tuple[Turn, int, int]
 
 
 def single_loop(measured: MeasuredRobot, goal: ClosedConfiguration, error: float) -> SingleLoop:
-    """The mechanism as one loop, what is measured held. Raises ``NotConfined`` where it is none, or what is measured
-    does not hold joints one by one."""
-    mechanism, seen = goal.twin.mechanism, measured.question.observations
-    bodies = leg_ends(measured.setting.anatomy)
+    """The mechanism as one loop, what is measured held. Raises ``UnsupportedLocus`` where it is none, or what is
+    measured does not hold joints one by one."""
+    mechanism, seen = goal.model.mechanism, measured.observation_model.observations
+    bodies = leg_ends(measured.setup.decomposition)
     ends = [link for joint in mechanism.joints.values() for link in joint.links]
     if (
         mechanism.couplings
         or len(bodies) != 1
-        or measured.setting.anatomy.point is not None
+        or measured.setup.decomposition.point is not None
         or any(ends.count(link) != 2 for link in mechanism.links)
     ):
-        raise NotConfined(mechanism.name, "it is not one loop, of which the platform is a body")
-    middle = Middle(goal.pose(bodies[0])[:3, 3], goal.twin.length)
+        raise UnsupportedLocus(mechanism.name, "it is not one loop, of which the platform is a body")
+    middle = OriginAndUnit(goal.pose(bodies[0])[:3, 3], goal.model.length)
     held = [each.joint for each in seen if isinstance(each, Encoder)]
     way, at, left = list[tuple[list[_Place], str]](), mechanism.base, list(mechanism.joints.values())
     while left:
         joint = next(each for each in left if at in each.links)
         left.remove(joint)
-        forward, places = joint.predecessor == at, list(goal.twin.coordinates.get(joint.name, ()))
+        forward, places = joint.predecessor == at, list(goal.model.coordinates.get(joint.name, ()))
         found = freedoms_of(joint, at, goal, middle, held)
         at = joint.other(at)
         way.append(
@@ -135,8 +137,11 @@ def single_loop(measured: MeasuredRobot, goal: ClosedConfiguration, error: float
     for each in seen:
         if isinstance(each, Encoder):
             continue
-        if not isinstance(each, Direction) or (each.seen_from or measured.question.reference) != mechanism.base:
-            raise NotConfined(mechanism.name, "what is measured is not a direction seen from the base")
+        if (
+            not isinstance(each, Direction)
+            or (each.seen_from or measured.observation_model.reference) != mechanism.base
+        ):
+            raise UnsupportedLocus(mechanism.name, "what is measured is not a direction seen from the base")
         k = [link for _, link in way].index(each.link) + 1
         d = goal.pose(each.link)[:3, :3] @ each.direction
         for side in (way[:k], way[k:]):
@@ -148,11 +153,11 @@ def single_loop(measured: MeasuredRobot, goal: ClosedConfiguration, error: float
                     part[:] = [one for one in part if one is not turning[0]]
                 break
         else:
-            raise NotConfined(mechanism.name, f"what is measured at {each.link} holds no joint")
+            raise UnsupportedLocus(mechanism.name, f"what is measured at {each.link} holds no joint")
     k = [link for _, link in way].index(bodies[0]) + 1
     chain = [one for part, _ in way for one in part]
     if not 0 < len(chain) <= LARGEST_CHAIN:
-        raise NotConfined(mechanism.name, f"its loop has {len(chain)} free joints")
+        raise UnsupportedLocus(mechanism.name, f"its loop has {len(chain)} free joints")
     return SingleLoop(
         (),
         np.zeros((0, 3)),
@@ -163,7 +168,7 @@ def single_loop(measured: MeasuredRobot, goal: ClosedConfiguration, error: float
         sum(len(part) for part, _ in way[:k]),
         bodies[0],
         goal,
-        measured.question,
+        measured.observation_model,
         tuple(one[1:] for one in chain),
         error=error,
     )
@@ -282,12 +287,12 @@ def _halves(x: Any) -> list[tuple[Any, Any]]:
 
 
 def solve_loop(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0) -> tuple[Model, SystemModes]:
-    """All modes, with the goal known to ``error`` (m). Raises ``NotConfined`` and ``Unsolved``."""
+    """All modes, with the goal known to ``error`` (m). Raises ``UnsupportedLocus`` and ``Unsolved``."""
     from flint import ctx
 
     if not np.isfinite(error):
-        raise NotConfined(measured.setting.robot.name, "no distance bounds how far it is from where its loops close")
-    loop, (body,) = single_loop(measured, goal, error), leg_ends(measured.setting.anatomy)
+        raise UnsupportedLocus(measured.setup.robot.name, "no distance bounds how far it is from where its loops close")
+    loop, (body,) = single_loop(measured, goal, error), leg_ends(measured.setup.decomposition)
     with ctx.workprec(PRECISION):
         found = _five(loop) if len(loop.freedoms_) == LARGEST_CHAIN else _few(loop)
     return Model(loop, lambda q: {body: loop.pose(q)}, loop.home, closing=lambda q: loop.close(q)[0]), found
@@ -310,7 +315,9 @@ def _few(loop: SingleLoop) -> SystemModes:
 
     n = len(loop.freedoms_)
     if not _regular(np.delete(_Linear(loop, 0).matrix(None), 0, axis=1)):  # the goal has c₁ c₂ and the like alone
-        raise Unsolved("the loop", f"{n} free joints: the linear equations of its products have several solutions")
+        raise SystemNotSolved(
+            "the loop", f"{n} free joints: the linear equations of its products have several solutions"
+        )
     box = _box(loop, [(arb(1), arb(0))] * n)
     assert box is not None
     proof = (
@@ -324,7 +331,9 @@ def _five(loop: SingleLoop) -> SystemModes:
     """Five joints: zeros of a determinant in one of them, that which tells most."""
     found = [each for first in range(LARGEST_CHAIN) if (each := _zeros(_Linear(loop, first))) is not None]
     if not found:
-        raise Unsolved("the loop", f"{LARGEST_CHAIN} free joints: a determinant does not distinguish its closings")
+        raise SystemNotSolved(
+            "the loop", f"{LARGEST_CHAIN} free joints: a determinant does not distinguish its closings"
+        )
     return min(found, key=lambda each: (not each.complete, max(mode.radius for mode in each.modes)))
 
 

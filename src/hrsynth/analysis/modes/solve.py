@@ -13,15 +13,25 @@ from ...geometry.vectors import Array, frozen
 from ...results import Value
 from ...tolerances import FARTHEST, NEAR_MODE, NEARLY_DOUBLE, SAME_RELATION, TIP_ROUNDING, VANISHES
 from .bounds import Bound, least_bound
-from .curves import Point
-from .fits import Meant, as_meant, dimension, is_excluded, meets, residual, stationary, torn, words
-from .multiples import most_zeros
+from .constrained_platform import System
+from .loci import Point
+from .modular_root_bound import most_zeros
+from .overdetermined import (
+    SnappedPoints,
+    dimension,
+    is_excluded,
+    meets,
+    residual,
+    snap_centres,
+    stationary,
+    torn,
+    words,
+)
+from .pose_coordinate_solver import Proposed, by_msolve, enclose_roots, propose_roots, wholes
 from .quadrics import PoseSystem
-from .roots import Root, Roots, nearly_double, solve_square
-from .squares import SquareSystem
-from .systems import System
+from .roots import RealSolution, SolutionSet, nearly_double, solve_square
+from .square_systems import SquareSystem
 from .translating import Translating
-from .wholes import Proposed, by_msolve, enclose_roots, propose_roots, wholes
 
 CHOICES = 5
 """Choices of legs that are given to a solver until one has finitely many solutions, and, besides the first, whose
@@ -55,7 +65,7 @@ class SystemMode(Value):
     multiplicity: int = 1
     proved: bool = False
     """Whether there is exactly one mode within the radius, for all input within its error."""
-    fits: bool = False
+    match_residual: bool = False
     """Whether the radius encloses exactly one solution of the square part, and all legs fit there to ``residual``: that
     does not prove it to be a mode."""
     rounded: bool = False
@@ -65,13 +75,13 @@ class SystemMode(Value):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Solved(Value):
+class SquareSolution(Value):
     """A square part of a system with all its solutions; ``modes`` are its real ones, in the order of ``roots.real``,
     and ``kept`` tells which of them are modes of the whole system."""
 
     system: System
     part: Part
-    roots: Roots
+    roots: SolutionSet
     modes: tuple[SystemMode, ...]
     kept: tuple[bool, ...]
 
@@ -94,13 +104,13 @@ class SystemModes(Value):
     complete: bool
     proof: str
     near: tuple[SystemMode, ...] = ()
-    degenerate: str | None = None
-    continuum: int | None = None
+    singular_solutions: str | None = None
+    continuous_family: int | None = None
     bound: str = "none"
     enclosed: bool = False
-    meant: tuple[Meant, ...] = ()
+    snapped: tuple[SnappedPoints, ...] = ()
     """What was made exact."""
-    solved: tuple[Solved, ...] = field(default=(), repr=False)
+    solved: tuple[SquareSolution, ...] = field(default=(), repr=False)
     """What was solved, one for each choice of the legs' branches, where the solutions of a square part are all: working
     material, which a copy or a pickle does not hold."""
     open: bool = False
@@ -140,8 +150,8 @@ def solve(system: System, *, near: bool = True, goal: Array | None = None) -> Sy
     Where no square part decides the pose, tips on surfaces are left to a solver that proposes poses: a homotopy for
     a rigid body, else msolve (``MissingExtra`` where that is not installed).
     """
-    system, told = as_meant(system)
-    return replace(_solve(system, near, goal), meant=told)
+    system, told = snap_centres(system)
+    return replace(_solve(system, near, goal), snapped=told)
 
 
 def _solve(system: System, near: bool, goal: Array | None) -> SystemModes:
@@ -166,8 +176,8 @@ def solve_by_msolve(system: System, *, near: bool = True, goal: Array | None = N
     As :func:`solve`, but solutions that coincide are counted once, and near modes are looked for from the solutions of
     one choice of legs alone. Raises ``MissingExtra``, ``Unsolved``.
     """
-    system, told = as_meant(system)
-    return replace(_propose(system, near, goal, lambda part, enough: by_msolve(part)), meant=told)
+    system, told = snap_centres(system)
+    return replace(_propose(system, near, goal, lambda part, enough: by_msolve(part)), snapped=told)
 
 
 def _propose(
@@ -209,12 +219,17 @@ def _undecided_modes(system: System, tried: bool, goal: Array | None, near: bool
             known,
             False,
             "nothing proved",
-            degenerate="no choice of legs decides the pose: tips on one line, in one point, or at rest",
+            singular_solutions="no choice of legs decides the pose: tips on one line, in one point, or at rest",
             open=True,
         )
     if not near:
         return SystemModes(
-            len(known), known, False, "nothing proved", degenerate="the equations depend on each other", open=True
+            len(known),
+            known,
+            False,
+            "nothing proved",
+            singular_solutions="the equations depend on each other",
+            open=True,
         )
     size = dimension(system)
     if not size:
@@ -223,7 +238,7 @@ def _undecided_modes(system: System, tried: bool, goal: Array | None, near: bool
             known,
             False,
             "nothing proved",
-            degenerate="the equations depend on each other, but no continuum of poses was found",
+            singular_solutions="the equations depend on each other, but no continuum of poses was found",
             open=True,
         )
     return replace(continuum(f"the tips can move together: a continuum of dimension {size}", size), open=True)
@@ -231,14 +246,14 @@ def _undecided_modes(system: System, tried: bool, goal: Array | None, near: bool
 
 def continuum(text: str, size: int) -> SystemModes:
     """Modes that form a continuum of this dimension."""
-    return SystemModes(0, (), False, "a continuum is not counted", degenerate=text, continuum=size)
+    return SystemModes(0, (), False, "a continuum is not counted", singular_solutions=text, continuous_family=size)
 
 
 def _judge(
     system: System,
     square: Part,
-    roots: Roots,
-    others: Iterable[tuple[Part, Roots]] | None,
+    roots: SolutionSet,
+    others: Iterable[tuple[Part, SolutionSet]] | None,
     goal: Array | None,
     most: Bound | None = None,
 ) -> SystemModes:
@@ -262,7 +277,7 @@ def _judge(
             None,
             bound,
             enclosed,
-            solved=(Solved(system, square, roots, tuple(found), (True,) * len(found)),),
+            solved=(SquareSolution(system, square, roots, tuple(found), (True,) * len(found)),),
         )
     whole = [mode for mode, root in zip(found, roots.real, strict=True) if not _torn(system, square, root)]
     at_goal = _goal(system, roots, whole, goal)
@@ -272,11 +287,11 @@ def _judge(
         if mode is at_goal or not (mode.proved and is_excluded(system, mode.q, mode.shift, mode.turn))
     ]
     modes = tuple(
-        mode if mode is at_goal else replace(mode, proved=False, fits=mode.proved)
+        mode if mode is at_goal else replace(mode, proved=False, match_residual=mode.proved)
         for mode in left
         if mode is at_goal or mode.residual <= VANISHES
     )
-    enclosed = roots.complete and len(modes) == len(left) and all(mode.proved or mode.fits for mode in modes)
+    enclosed = roots.complete and len(modes) == len(left) and all(mode.proved or mode.match_residual for mode in modes)
     open_ = [mode for mode in left if mode is not at_goal and mode.residual > VANISHES]
     lost = goal is not None and not any(_same(system, mode.q, goal) for mode in left)
     if goal is not None and not any(_same(system, mode.q, goal) for mode in modes):
@@ -299,7 +314,7 @@ def _judge(
         None,
         bound,
         enclosed,
-        solved=(Solved(system, square, roots, tuple(found), kept),),
+        solved=(SquareSolution(system, square, roots, tuple(found), kept),),
     )
 
 
@@ -310,7 +325,7 @@ def _by_construction(system: System, goal: Array, legs: tuple[int, ...]) -> Syst
     )
 
 
-def _goal(system: System, roots: Roots, found: Sequence[SystemMode], goal: Array | None) -> SystemMode | None:
+def _goal(system: System, roots: SolutionSet, found: Sequence[SystemMode], goal: Array | None) -> SystemMode | None:
     """The solution that is the goal: the only one that can be, where all are known."""
     if goal is None or not roots.complete:
         return None
@@ -323,7 +338,7 @@ def _same(system: System, q: Array, goal: Array) -> bool:
     return float(np.abs(system.tips_at(q) - system.tips_at(goal)).max()) <= SAME_RELATION * system.size
 
 
-def _bound(system: System, part: PoseSystem, most: Bound | None, roots: Roots) -> tuple[str, str]:
+def _bound(system: System, part: PoseSystem, most: Bound | None, roots: SolutionSet) -> tuple[str, str]:
     """By what there are no more solutions than a solver proposes, and the proof in words (theory.md 8)."""
     proof = _proof(system, roots)
     known = f", {roots.beyond} enclosed at infinity" if roots.beyond else ""
@@ -344,7 +359,7 @@ def _bound(system: System, part: PoseSystem, most: Bound | None, roots: Roots) -
 
 
 def _near(
-    system: System, found: Sequence[SystemMode], modes: Sequence[SystemMode], others: Iterable[tuple[Part, Roots]]
+    system: System, found: Sequence[SystemMode], modes: Sequence[SystemMode], others: Iterable[tuple[Part, SolutionSet]]
 ) -> tuple[SystemMode, ...]:
     """Near modes, from all solutions of one square part and of others."""
     starts = [mode.q for mode in found]
@@ -353,7 +368,7 @@ def _near(
     return tuple(_nearly(system, q) for q in stationary(system, starts, [mode.q for mode in modes]))
 
 
-def _mode(system: System, square: Part, root: Root) -> SystemMode:
+def _mode(system: System, square: Part, root: RealSolution) -> SystemMode:
     parameters = tuple(float(each.mid()) for each in root.parameters)
     q = square.place(parameters)
     at = system.tips_at(q)
@@ -379,13 +394,13 @@ def _mode(system: System, square: Part, root: Root) -> SystemMode:
     )
 
 
-def _points(square: SquareSystem, root: Root) -> list[tuple[Array, float]]:
+def _points(square: SquareSystem, root: RealSolution) -> list[tuple[Array, float]]:
     """The points of a square's curves at a solution, and how far the exact ones can be from them (m)."""
     points = [curve.at(float(s.mid())) for curve, s in zip(square.unknowns, root.parameters, strict=True)]
     return list(zip(points, root.misses, strict=True))
 
 
-def _torn(system: System, square: Part, root: Root) -> bool:
+def _torn(system: System, square: Part, root: RealSolution) -> bool:
     """Whether the tips of a solution's legs are torn from a rigid platform; where none rests, the square part's
     equations are that they are not."""
     return (
@@ -397,7 +412,7 @@ def _torn(system: System, square: Part, root: Root) -> bool:
     )
 
 
-def _sure(system: System, root: Root) -> bool:
+def _sure(system: System, root: RealSolution) -> bool:
     """Whether a root's enclosure is proved for all input within its error."""
     return bool(np.isfinite(system.error) and root.unique and root.thick)
 
@@ -406,7 +421,7 @@ def _nearly(system: System, q: Array) -> SystemMode:
     return SystemMode((), np.inf, np.inf, np.pi, residual(system, q), frozen(system.pose(q)), frozen(q), near=True)
 
 
-def _proof(system: System, roots: Roots) -> str:
+def _proof(system: System, roots: SolutionSet) -> str:
     if not roots.degree and roots.complex:
         return "tips at rest, which leave one pose"
     text = f"{roots.method} of degree {roots.degree}"
@@ -431,7 +446,7 @@ def _proof(system: System, roots: Roots) -> str:
     return text
 
 
-def _special(roots: Roots) -> str | None:
+def _special(roots: SolutionSet) -> str | None:
     if roots.undecided:
         return (
             "solutions of all distances: which of them a special geometry that is meant would send to infinity is "

@@ -18,24 +18,24 @@ import numpy as np
 from ...constraints.locked_legs import LockedLeg
 from ...constraints.named_vectors import BodyPoint, BodyVector, NamedVector, Tangent, poses_at
 from ...constraints.pattern import ConstraintPattern
-from ...errors import NotConfined
+from ...errors import UnsupportedLocus
 from ...geometry.ranks import kernel_basis
 from ...geometry.vectors import Array, transform
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.leg_reach import alone
-from ...kinematics.locked import joint_at, rezero
+from ...kinematics.locked_twists import joint_at, rezero
 from ...kinematics.pinocchio_model import PinocchioModel
-from ...kinematics.relation import Measurement
-from ...kinematics.tasks import Held, solve
+from ...kinematics.tasks import FixedValuesTask, solve
+from ...kinematics.velocity_relation import ObservationModel
 from ...mechanism import Observation
 from ...mechanism.composites import WordGraph
 from ...mechanism.legs import LegDecomposition, decompose
 from ...results import Value
 from ...tolerances import CLOSED, FOLLOWED, MOVED, SAME_POINT, SAME_RELATION, SOLVED
-from .chain import Chain, Underived, chain
-from .curves import Circle, Line, Plane, Point, Reach, Sphere
-from .reaches import reaches
-from .turns import kept_angle, orientations
+from .leg_orientations import kept_angle, orientations
+from .loci import Circle, Line, Plane, Point, Reach, Sphere
+from .loci_from_joints import reaches
+from .locked_chain import Chain, LocusNotDerived, chain
 
 MOVES = (-0.4, -0.15, 0.15, 0.4)
 """How far a leg is moved along a freedom to check where its tip can be (characteristic lengths, radians)."""
@@ -102,99 +102,127 @@ class TipLoci(Value):
 
 
 def tip_loci(
-    anatomy: LegDecomposition, question: Measurement, pattern: ConstraintPattern, goal: ClosedConfiguration
+    decomposition: LegDecomposition,
+    observation_model: ObservationModel,
+    pattern: ConstraintPattern,
+    goal: ClosedConfiguration,
 ) -> TipLoci:
     """Where all watched legs' tips can be with the directions held at their values at ``goal``.
 
-    Raises ``NotConfined`` where that is no point, line, circle, sphere or plane, or the platform's motion none of those
-    known, or where a platform that turns can be held turned otherwise.
-    """
-    name = anatomy.mechanism.name
+    Raises ``UnsupportedLocus`` where that is no point, line, circle, sphere or plane, or the platform's motion none of
+    those known, or where a platform that turns can be held turned otherwise."""
+    name = decomposition.mechanism.name
     if pattern.motion == "other":
-        raise NotConfined(name, "the pattern of its legs is not a known one")
-    if pattern.turning and not any(_turned_once(anatomy, question, leg, goal) for leg in pattern.legs):
-        raise NotConfined(name, "its legs may hold the platform turned otherwise")
+        raise UnsupportedLocus(name, "the pattern of its legs is not a known one")
+    if pattern.turning and not any(_turned_once(decomposition, observation_model, leg, goal) for leg in pattern.legs):
+        raise UnsupportedLocus(name, "its legs may hold the platform turned otherwise")
     plane = None if pattern.plane is None else _value(pattern.plane, goal)
     end = (
         plane
         if plane is not None and pattern.motion == "planar"
         else "free"
-        if pattern.motion in ("spatial", "oriented") or anatomy.point is not None
+        if pattern.motion in ("spatial", "oriented") or decomposition.point is not None
         else "kept"
     )
-    tips = tuple(_tip(anatomy, question, leg, goal, end) for leg in pattern.legs if not leg.free)
+    tips = tuple(_tip(decomposition, observation_model, leg, goal, end) for leg in pattern.legs if not leg.free)
     angles = tuple(
-        _angle(anatomy, question, leg, goal) for leg in pattern.legs if pattern.motion == "oriented" and leg.turns < 3
+        _angle(decomposition, observation_model, leg, goal)
+        for leg in pattern.legs
+        if pattern.motion == "oriented" and leg.turns < 3
     )
-    slide, doubt = (None, None) if pattern.slide is None else _slide(anatomy, pattern, goal)
+    slide, doubt = (None, None) if pattern.slide is None else _slide(decomposition, pattern, goal)
     return TipLoci(goal, pattern.motion, tips, pattern.bodies, plane, slide, angles, doubt=doubt)
 
 
 def _held_chain(
-    anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, at: ClosedConfiguration, end: Array | str
+    decomposition: LegDecomposition,
+    observation_model: ObservationModel,
+    leg: LockedLeg,
+    at: ClosedConfiguration,
+    end: Array | str,
 ) -> Chain:
     """The chain to a leg's tip, its observations held; raises ``Underived``."""
-    own = [o for o in question.observations if o.leg == leg.label]
-    return chain(anatomy, anatomy.leg(leg.label), own, at, _value(leg.tip, at) * at.twin.length, end)
+    own = [o for o in observation_model.observations if o.leg == leg.label]
+    return chain(decomposition, decomposition.leg(leg.label), own, at, _value(leg.tip, at) * at.model.length, end)
 
 
-def _turned_once(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, goal: ClosedConfiguration) -> bool:
+def _turned_once(
+    decomposition: LegDecomposition, observation_model: ObservationModel, leg: LockedLeg, goal: ClosedConfiguration
+) -> bool:
     """Whether the joints of a held leg leave its end one orientation, that at the goal, in all of its branches."""
     if leg.virtual or leg.turns:
         return False
     try:
-        known = [bodies for bodies, _ in orientations(_held_chain(anatomy, question, leg, goal, "free"))]
-    except Underived:
+        known = [bodies for bodies, _ in orientations(_held_chain(decomposition, observation_model, leg, goal, "free"))]
+    except LocusNotDerived:
         return False
     return len(known) == 1 and known[0][-1] is not None
 
 
-def _angle(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, goal: ClosedConfiguration) -> KeptAngle:
-    """The angle that a leg keeps; raises ``NotConfined`` where its joints do not show one."""
+def _angle(
+    decomposition: LegDecomposition, observation_model: ObservationModel, leg: LockedLeg, goal: ClosedConfiguration
+) -> KeptAngle:
+    """The angle that a leg keeps; raises ``UnsupportedLocus`` where its joints do not show one."""
     try:
-        found = _held_chain(anatomy, question, leg, goal, "free")
+        found = _held_chain(decomposition, observation_model, leg, goal, "free")
         axis, direction = kept_angle(found)
-    except Underived as error:
-        raise NotConfined(
-            anatomy.mechanism.name, f"how leg {leg.label} turns the platform is not known: {error}"
+    except LocusNotDerived as error:
+        raise UnsupportedLocus(
+            decomposition.mechanism.name, f"how leg {leg.label} turns the platform is not known: {error}"
         ) from None
     return KeptAngle(leg.label, leg.body, goal.pose(leg.body)[:3, :3].T @ direction, axis, MOVED * found.moved)
 
 
 def _tip(
-    anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, goal: ClosedConfiguration, end: Array | str
+    decomposition: LegDecomposition,
+    observation_model: ObservationModel,
+    leg: LockedLeg,
+    goal: ClosedConfiguration,
+    end: Array | str,
 ) -> Tip:
-    B = _value(leg.tip, goal) * goal.twin.length
+    B = _value(leg.tip, goal) * goal.model.length
     X = goal.pose(leg.body)
     place = X[:3, :3].T @ (B - X[:3, 3])
-    own = [o for o in question.observations if o.leg == leg.label]
+    own = [o for o in observation_model.observations if o.leg == leg.label]
 
     def branches(at: ClosedConfiguration) -> tuple[list[tuple[Reach, float]], float]:
-        return reaches(_held_chain(anatomy, question, leg, at, end))
+        return reaches(_held_chain(decomposition, observation_model, leg, at, end))
 
     try:
         found, moved = branches(goal)
-    except Underived as error:
+    except LocusNotDerived as error:
         return _fit_tip(
-            anatomy, own, question.reference, Tip(leg.label, leg.body, place, Point(B), doubt=str(error)), leg, goal
+            decomposition,
+            own,
+            observation_model.reference,
+            Tip(leg.label, leg.body, place, Point(B), doubt=str(error)),
+            leg,
+            goal,
         )
     if moved:  # at the zero configuration, unless that is special, the file's own decimals show it
-        with suppress(Underived):
-            moved = branches(ClosedConfiguration(goal.twin, goal.twin.q0, 0.0))[1]
+        with suppress(LocusNotDerived):
+            moved = branches(ClosedConfiguration(goal.model, goal.model.q0, 0.0))[1]
     freedoms = 0 if leg.fixed else 1 if leg.line is not None else 2 if leg.normal is not None else 3
     here = found[0][0]
-    if here.freedoms == freedoms and np.linalg.norm(here.miss(B)) <= FOLLOWED * goal.twin.length:
+    if here.freedoms == freedoms and np.linalg.norm(here.miss(B)) <= FOLLOWED * goal.model.length:
         return Tip(leg.label, leg.body, place, here, tuple(found[1:]), moved=moved)
     doubt = (
         f"its joints taken one by one leave {here.freedoms} freedoms, together {freedoms}"
         if here.freedoms != freedoms
         else "its joints put its end elsewhere"
     )
-    return _fit_tip(anatomy, own, question.reference, Tip(leg.label, leg.body, place, Point(B), doubt=doubt), leg, goal)
+    return _fit_tip(
+        decomposition,
+        own,
+        observation_model.reference,
+        Tip(leg.label, leg.body, place, Point(B), doubt=doubt),
+        leg,
+        goal,
+    )
 
 
 def _fit_tip(
-    anatomy: LegDecomposition,
+    decomposition: LegDecomposition,
     own: Sequence[Observation],
     reference: str,
     tip: Tip,
@@ -202,13 +230,15 @@ def _fit_tip(
     goal: ClosedConfiguration,
 ) -> Tip:
     """A tip's curve or surface as the pattern names it, to which the leg's moves keep."""
-    B = _value(leg.tip, goal) * goal.twin.length
+    B = _value(leg.tip, goal) * goal.model.length
     paths = _held_paths(own, reference, leg, goal, tip.place)
     if not leg.fixed and not paths:
-        raise NotConfined(anatomy.mechanism.name, f"leg {leg.label} cannot be moved to see where its tip goes")
+        raise UnsupportedLocus(
+            decomposition.mechanism.name, f"leg {leg.label} cannot be moved to see where its tip goes"
+        )
     worst = np.inf
-    for curve in _candidates(anatomy, leg, B, goal):
-        miss = max((float(np.linalg.norm(curve.miss(point))) for point in paths), default=0.0) / goal.twin.length
+    for curve in _candidates(decomposition, leg, B, goal):
+        miss = max((float(np.linalg.norm(curve.miss(point))) for point in paths), default=0.0) / goal.model.length
         if miss <= SAME_RELATION:
             return replace(tip, curve=curve)
         worst = min(worst, miss)
@@ -217,10 +247,12 @@ def _fit_tip(
         if worst == np.inf
         else f"leaves its curve or surface by {worst:.2g} characteristic lengths"
     )
-    raise NotConfined(anatomy.mechanism.name, f"the tip of leg {leg.label} {what}")
+    raise UnsupportedLocus(decomposition.mechanism.name, f"the tip of leg {leg.label} {what}")
 
 
-def _candidates(anatomy: LegDecomposition, leg: LockedLeg, tip: Array, goal: ClosedConfiguration) -> Iterator[Reach]:
+def _candidates(
+    decomposition: LegDecomposition, leg: LockedLeg, tip: Array, goal: ClosedConfiguration
+) -> Iterator[Reach]:
     """Curves with the tangent that the pattern names: a circle about the axis with the tip on it, or with the tip
     carried along by the end of the link that turns, whichever of the two bodies its axis is fixed in. Surfaces with
     the normal that it names: a plane, or a sphere with the radius of a link that lies along the normal."""
@@ -231,23 +263,23 @@ def _candidates(anatomy: LegDecomposition, leg: LockedLeg, tip: Array, goal: Clo
     elif isinstance(leg.line, Tangent):
         turning = _circle(leg.line, tip, goal)
         yield from (turning, _opposite(turning, tip))
-        axis, on = _value(leg.line.axis, goal), _value(leg.line.start, goal) * goal.twin.length
+        axis, on = _value(leg.line.axis, goal), _value(leg.line.start, goal) * goal.model.length
         spoke = tip - on - axis * float(axis @ (tip - on))
-        if np.linalg.norm(spoke) > SAME_POINT * goal.twin.length:
+        if np.linalg.norm(spoke) > SAME_POINT * goal.model.length:
             yield Circle(tip - spoke, axis, float(np.linalg.norm(spoke)), spoke)
     elif leg.normal is not None:
         n = _value(leg.normal, goal)
-        for rod in _rods(anatomy, leg, n, goal):
+        for rod in _rods(decomposition, leg, n, goal):
             yield from (Sphere(tip - rod, float(np.linalg.norm(rod))), Sphere(tip + rod, float(np.linalg.norm(rod))))
         yield Plane(tip, n)
 
 
-def _rods(anatomy: LegDecomposition, leg: LockedLeg, along: Array, goal: ClosedConfiguration) -> list[Array]:
+def _rods(decomposition: LegDecomposition, leg: LockedLeg, along: Array, goal: ClosedConfiguration) -> list[Array]:
     """From joint centre to joint centre (m) of a leg, where that is parallel to a direction."""
-    joints = [anatomy.mechanism.joints[name] for name in anatomy.leg(leg.label).joints]
-    centres = [joint_at(goal, joint)[0] * goal.twin.length for joint in joints]
+    joints = [decomposition.mechanism.joints[name] for name in decomposition.leg(leg.label).joints]
+    centres = [joint_at(goal, joint)[0] * goal.model.length for joint in joints]
     between = [other - one for one, other in combinations(centres, 2)]
-    small = SAME_POINT * goal.twin.length
+    small = SAME_POINT * goal.model.length
     return [
         rod
         for rod in between
@@ -257,7 +289,7 @@ def _rods(anatomy: LegDecomposition, leg: LockedLeg, along: Array, goal: ClosedC
 
 def _circle(tangent: Tangent, tip: Array, goal: ClosedConfiguration) -> Circle:
     """The circle on which ``tip`` moves when it translates with the end of a link that turns about an axis."""
-    length = goal.twin.length
+    length = goal.model.length
     axis = _value(tangent.axis, goal)
     on, end = _value(tangent.start, goal) * length, _value(tangent.end, goal) * length
     spoke = end - on - axis * float(axis @ (end - on))
@@ -270,7 +302,7 @@ def _opposite(circle: Circle, tip: Array) -> Circle:
 
 
 def _slide(
-    anatomy: LegDecomposition, pattern: ConstraintPattern, goal: ClosedConfiguration
+    decomposition: LegDecomposition, pattern: ConstraintPattern, goal: ClosedConfiguration
 ) -> tuple[Circle | Line, str | None]:
     """The curve of the second body's origin relative to the first's, and why it may not be all.
 
@@ -281,20 +313,20 @@ def _slide(
     if pattern.slide is not None and not isinstance(pattern.slide, Tangent):
         return Line(at, _value(pattern.slide, goal)), None
     one, other = pattern.bodies
-    graph = WordGraph(anatomy.mechanism, pattern.bodies, anatomy.platform).recognise()
+    graph = WordGraph(decomposition.mechanism, pattern.bodies, decomposition.platform).recognise()
     for _, edge in graph.between(one, other):
         if len(edge.joints) == 4:
-            joints = [anatomy.mechanism.joints[name] for name in edge.joints[:2]]
+            joints = [decomposition.mechanism.joints[name] for name in edge.joints[:2]]
             near, far = joints if edge.tail == one else joints[::-1]
             (start, axes), (end, _) = joint_at(goal, near), joint_at(goal, far)
-            spoke = (end - start - axes[0] * float(axes[0] @ (end - start))) * goal.twin.length
+            spoke = (end - start - axes[0] * float(axes[0] @ (end - start))) * goal.model.length
             return Circle(at - spoke, axes[0], float(np.linalg.norm(spoke)), spoke), None
     assert isinstance(pattern.slide, Tangent)
     first = _circle(pattern.slide, at, goal)
     second = _opposite(first, at)
     kernel, _ = goal.kernel()
     step = kernel @ np.linalg.svd(moving @ kernel)[2][0]
-    nearby, _ = solve(goal.twin, goal.twin.integrate(goal.q, MOVES[-1] * step), tolerance=SOLVED)
+    nearby, _ = solve(goal.model, goal.model.integrate(goal.q, MOVES[-1] * step), tolerance=SOLVED)
     there, _ = _apart(pattern, goal, nearby)
     circle = min((first, second), key=lambda circle: float(np.linalg.norm(circle.miss(there))))
     return circle, f"no parallelogram joins {one} and {other}"
@@ -302,7 +334,7 @@ def _slide(
 
 def _apart(pattern: ConstraintPattern, goal: ClosedConfiguration, q: Array) -> tuple[Array, Array]:
     """From the first body's origin to the second's (3,), and its velocity (3, nv)."""
-    X, V = goal.twin.frames(q, pattern.bodies)
+    X, V = goal.model.frames(q, pattern.bodies)
     return X[1, :3, 3] - X[0, :3, 3], V[1, :3] - V[0, :3]
 
 
@@ -312,10 +344,10 @@ def _held_paths(
     """Positions of a tip when its leg alone, with what is measured held, is moved along each of its freedoms, and along
     some random combinations of them."""
     rest = decompose(rezero(goal))
-    twin = PinocchioModel(alone(rest, rest.leg(leg.label)), goal.twin.length)
-    held = Held.at(twin, twin.q0, reference, own)
-    start = ClosedConfiguration.of(twin, twin.q0, SAME_RELATION)
-    free, _ = kernel_basis(np.vstack([twin.jacobian(start.q), held.rows(twin, start.q)[1]]))
+    model = PinocchioModel(alone(rest, rest.leg(leg.label)), goal.model.length)
+    held = FixedValuesTask.at(model, model.q0, reference, own)
+    start = ClosedConfiguration.of(model, model.q0, SAME_RELATION)
+    free, _ = kernel_basis(np.vstack([model.jacobian(start.q), held.error_and_jacobian(model, start.q)[1]]))
     found = []
     directions = free.T
     if len(directions) > 1:
@@ -323,8 +355,8 @@ def _held_paths(
         directions = np.vstack([directions, mixed / np.linalg.norm(mixed, axis=1, keepdims=True)])
     for direction in directions:
         for size in MOVES:
-            q, residual = solve(twin, twin.integrate(start.q, size * direction), held, tolerance=SOLVED)
-            X = twin.pose(q, leg.body)
+            q, residual = solve(model, model.integrate(start.q, size * direction), held, tolerance=SOLVED)
+            X = model.pose(q, leg.body)
             if residual <= CLOSED:
                 found.append(transform(X, place))
     return found

@@ -13,7 +13,8 @@ import numpy as np
 from ...errors import BadRequest
 from ...geometry.vectors import Array, cross
 from ...tolerances import PARALLEL, TIP_ROUNDING, VANISHES
-from .curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, extent, length, shift_reach
+from .constrained_platform import Shifting
+from .loci import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, extent, length, shift_reach
 from .polynomials import Equation
 from .quadrics import (
     Conic,
@@ -31,8 +32,7 @@ from .quadrics import (
     sum_on_plane,
     sum_on_sphere,
 )
-from .squares import SquareSystem, resting, single, three_surfaces
-from .systems import Shifting
+from .square_systems import SquareSystem, resting, single, three_surfaces
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -7,16 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...batch.placing import Placer
+from ...batch.configuration_builder import ConfigurationBuilder
 from ...errors import Disagreement
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.relation import Measurement, relation
+from ...kinematics.velocity_relation import ObservationModel, relation
 from ...mechanism.observations.direction import Direction
 from ...tolerances import SAME_RELATION
-from ..classes import interaction_matrix
+from ..singularity_indices import interaction_matrix
 
-Spectrum = Callable[[Sequence[ClosedConfiguration], Measurement], tuple[Array, Array]]
+Spectrum = Callable[[Sequence[ClosedConfiguration], ObservationModel], tuple[Array, Array]]
 SPOTS = 10
 """Configurations of each sweep at which the batch is held against Pinocchio."""
 
@@ -25,17 +25,17 @@ SPOTS = 10
 class Quick:
     """A batch that answers a question about directions, one a leg."""
 
-    placer: Placer
-    question: Measurement
+    placer: ConfigurationBuilder
+    observation_model: ObservationModel
 
     @classmethod
-    def of(cls, placer: Placer | None, question: Measurement) -> Quick | None:
+    def of(cls, placer: ConfigurationBuilder | None, observation_model: ObservationModel) -> Quick | None:
         """None where there is no batch, or it is not asked for its own directions."""
         if placer is None or not all(
-            isinstance(o, Direction) and o is placer.seen.get(o.leg) for o in question.observations
+            isinstance(o, Direction) and o is placer.seen.get(o.leg) for o in observation_model.observations
         ):
             return None
-        return cls(placer, question)
+        return cls(placer, observation_model)
 
     def spectrum(
         self, configurations: Sequence[ClosedConfiguration], others: Spectrum, seed: int = 0
@@ -44,10 +44,10 @@ class Quick:
         is in another working mode than the batch's, or on the edge between two.
 
         Raises ``Disagreement`` where Pinocchio differs."""
-        seen = [o for o in self.question.observations if isinstance(o, Direction)]
-        links = (self.question.platform, *(o.link for o in seen))
-        X = np.array([at.twin.poses(at.q, links) for at in configurations])
-        found = self.placer.batch.evaluate(X[:, 0], [o.leg for o in self.question.observations])
+        seen = [o for o in self.observation_model.observations if isinstance(o, Direction)]
+        links = (self.observation_model.platform, *(o.link for o in seen))
+        X = np.array([at.model.poses(at.q, links) for at in configurations])
+        found = self.placer.batch.evaluate(X[:, 0], [o.leg for o in self.observation_model.observations])
         u = np.stack([X[:, i, :3, :3] @ o.direction for i, o in enumerate(seen, 1)], axis=1)
         away = np.where(found.reached, np.max(np.abs(u - found.directions), axis=(1, 2)), np.inf)
         same = away <= SAME_RELATION
@@ -60,11 +60,11 @@ class Quick:
         smallest, largest = values[:, -1].copy(), values[:, 0].copy()
         if not same.all():
             elsewhere = [configurations[int(i)] for i in np.flatnonzero(~same)]
-            smallest[~same], largest[~same] = others(elsewhere, self.question)
+            smallest[~same], largest[~same] = others(elsewhere, self.observation_model)
         return smallest, largest
 
     def _check(self, at: ClosedConfiguration, values: Array) -> None:
-        theirs = relation(at, self.question)
+        theirs = relation(at, self.observation_model)
         M = interaction_matrix(theirs)
         if M is None or theirs.dof.value != len(values):
             return
@@ -73,4 +73,4 @@ class Quick:
         expected[: len(found)] = found
         apart = float(np.max(np.abs(expected - values)))
         if apart > SAME_RELATION * max(1.0, float(values[0])):
-            raise Disagreement(self.placer.twin.mechanism.name, 1, apart)
+            raise Disagreement(self.placer.model.mechanism.name, 1, apart)

@@ -11,24 +11,24 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from ...batch.reach import grid_dependence, reach, sweep
+from ...batch.pose_continuation import grid_dependence, reach, sweep
 from ...budgets import CLOSER, COARSE_GRID, LOCUS_SIDES
-from ...errors import BadRequest, PlaneNotMet, PoseNotReached
+from ...errors import BadRequest, NoReachablePose, PoseNotReached
 from ...geometry.so3 import turn_about
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
-from ...kinematics.relation import Measurement
+from ...kinematics.velocity_relation import ObservationModel
 from ...mechanism import Mechanism
 from ...mechanism.pose import Grid, Pose, as_pose
-from ...progress import tell
+from ...progress import report
 from ...records import As, Number, Recorded, Shown, recorded
 from ...results import Value
 from ...tolerances import ON_PLANE, SAME_RELATION, SAME_SPOT
 from ..measured import MeasuredRobot
 from ..observed import CameraLike, ObservedRobot, SeeLike
-from .agreement import descend, spectrum, weakest
 from .batch_spectrum import Quick
+from .condition_check import descend, spectrum, weakest
 from .rank_curve import PlaneOfPoses
 
 STARTS = 8
@@ -86,29 +86,31 @@ def locus(
     """Where the hidden and the real robot (with its own motors) lose a freedom over a plane of poses.
 
     ``plane`` fixes parts of the pose so that two are left; a robot that is only partially controllable has no locus
-    (``BadRequest``). Raises ``PlaneNotMet`` where no pose of the plane is reached.
+    (``BadRequest``). Raises ``NoReachablePose`` where no pose of the plane is reached.
     """
-    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
-    hidden = _controllable(setting)
+    setup = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
+    hidden = _controllable(setup)
     real = None
-    if any(joint.actuated for joint in setting.mechanism.joints.values()):
-        driven = MeasuredRobot.of_motors(setting)
-        real = driven if driven.rank == setting.dof else None
+    if any(joint.actuated for joint in setup.mechanism.joints.values()):
+        driven = MeasuredRobot.of_motors(setup)
+        real = driven if driven.rank == setup.dof else None
     return _locus(hidden, real, None if plane is None else as_pose(plane), steps)
 
 
-def require_plane(setting: ObservedRobot, plane: Pose | str | None) -> None:
+def require_plane(setup: ObservedRobot, plane: Pose | str | None) -> None:
     """Raise what ``locus`` would raise of the robot or of the plane: before long work, not after it."""
-    hidden = _controllable(setting)
-    _begin_plane(setting.everything.start, hidden.question, setting.motion, None if plane is None else as_pose(plane))
+    hidden = _controllable(setup)
+    _begin_plane(
+        setup.all_samples.start, hidden.observation_model, setup.motion, None if plane is None else as_pose(plane)
+    )
 
 
-def _controllable(setting: ObservedRobot) -> MeasuredRobot:
+def _controllable(setup: ObservedRobot) -> MeasuredRobot:
     """The hidden robot; raises ``BadRequest`` where it has no locus."""
-    hidden = MeasuredRobot.of_directions(setting)
-    if hidden.verdict.rank < setting.dof:
+    hidden = MeasuredRobot.of_directions(setup)
+    if hidden.verdict.rank < setup.dof:
         raise BadRequest(
-            f"{setting.robot.name} has no locus: a freedom is lost at every pose",
+            f"{setup.robot.name} has no locus: a freedom is lost at every pose",
             None,
             "legs that make it controllable",
         )
@@ -118,31 +120,33 @@ def _controllable(setting: ObservedRobot) -> MeasuredRobot:
 def _locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None, steps: int) -> Locus:
     """Both robots over the plane that ``plane`` fixes (default: of three parts the third as at the zero configuration).
 
-    Raises ``PlaneNotMet`` where no pose of it is reached, ``BadRequest`` where it does not leave two parts free.
+    Raises ``NoReachablePose`` where no pose of it is reached, ``BadRequest`` where it does not leave two parts free.
     """
-    question, motion, start = hidden.question, hidden.setting.motion, hidden.setting.everything.start
-    placer = hidden.setting.placer
+    observation_model, motion, start = hidden.observation_model, hidden.setup.motion, hidden.setup.all_samples.start
+    placer = hidden.setup.placer
 
     def met(first: ClosedConfiguration, coarse: Grid) -> NDArray[np.bool_]:
-        return np.array([at is not None for at in sweep(first, question, coarse, motion, placer)])
+        return np.array([at is not None for at in sweep(first, observation_model, coarse, motion, placer)])
 
-    grid = frame_plane(start, question, motion, plane, steps, met)
-    configurations = sweep(start, question, grid, motion, placer)
+    grid = frame_plane(start, observation_model, motion, plane, steps, met)
+    configurations = sweep(start, observation_model, grid, motion, placer)
     if not any(configurations):
-        raise PlaneNotMet(
-            start.twin.mechanism.name,
+        raise NoReachablePose(
+            start.model.mechanism.name,
             f"the plane {grid.fixed}",
             "none of its poses is reached",
             grid_dependence(start, motion, grid),
         )
 
     def field(measured: MeasuredRobot) -> SingularityMap:
-        tell("locus")
+        report("locus")
         condition = measured.condition
         reached = [(i, at) for i, at in enumerate(configurations) if at is not None]
         places, here = [i for i, _ in reached], [at for _, at in reached]
-        quick = Quick.of(placer, measured.question)
-        smallest, largest = spectrum(here, measured.question) if quick is None else quick.spectrum(here, spectrum)
+        quick = Quick.of(placer, measured.observation_model)
+        smallest, largest = (
+            spectrum(here, measured.observation_model) if quick is None else quick.spectrum(here, spectrum)
+        )
         value = condition.evaluate(measured.pattern.values_at(here))
         tables = []
         for column in (value, smallest, 1 / np.where(largest > 0, largest, np.nan)):
@@ -152,7 +156,7 @@ def _locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None
         spots, curve = np.zeros((0, 2)), np.zeros((0, 2, 2))
         if not (condition.signed or condition.never):
             spots = _spots(grid, [here[places.index(i)] for i in _valleys(tables[1])], measured)
-            curve = PlaneOfPoses(measured.question, motion, grid).curve(configurations)
+            curve = PlaneOfPoses(measured.observation_model, motion, grid).curve(configurations)
             spots = _aside(spots, curve, grid)
         return SingularityMap(
             tables[0], condition.signed, tables[1], tables[2], spots, curve, condition.never, not measured.unexamined
@@ -163,7 +167,7 @@ def _locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None
 
 def frame_plane(
     start: ClosedConfiguration,
-    question: Measurement,
+    observation_model: ObservationModel,
     motion: PlatformMotion,
     plane: Pose | None,
     steps: int,
@@ -171,12 +175,13 @@ def frame_plane(
 ) -> Grid:
     """The grid that just holds what is reached of a plane; ``met`` says which cells of a coarse one are, (n,).
 
-    Raises ``PlaneNotMet`` where the plane's own parts are out of reach, ``BadRequest`` where not two parts are free."""
-    plane, names, first = _begin_plane(start, question, motion, plane)
+    Raises ``NoReachablePose`` where the plane's own parts are out of reach, ``BadRequest`` where not two parts are
+    free."""
+    plane, names, first = _begin_plane(start, observation_model, motion, plane)
     centre = _coordinates(motion, first, names)
     centre = [0.0 if name == "phi" else c for name, c in zip(names, centre, strict=True)]
     for wide in LOCUS_SIDES:
-        half = [np.pi if name == "phi" else wide * start.twin.length for name in names]
+        half = [np.pi if name == "phi" else wide * start.model.length for name in names]
         axes = [(name, np.linspace(c - h, c + h, COARSE_GRID)) for name, c, h in zip(names, centre, half, strict=True)]
         coarse = Grid(tuple(axes), plane)
         cells = np.argwhere(met(first, coarse).reshape(coarse.shape))
@@ -195,7 +200,7 @@ def frame_plane(
     for axis, end in product(range(2), range(2)):
         (pose,) = coarse.poses_at([cells[np.argsort(cells[:, axis], kind="stable")[-end]]])
         try:
-            beside[axis, end] = reach(first, question, pose, motion)
+            beside[axis, end] = reach(first, observation_model, pose, motion)
         except PoseNotReached:
             beside[axis, end] = first
     moved = np.inf
@@ -211,15 +216,15 @@ def frame_plane(
 
 
 def _begin_plane(
-    start: ClosedConfiguration, question: Measurement, motion: PlatformMotion, plane: Pose | None
+    start: ClosedConfiguration, observation_model: ObservationModel, motion: PlatformMotion, plane: Pose | None
 ) -> tuple[Pose, tuple[str, ...], ClosedConfiguration]:
     """The plane's fixed parts, the two that vary, and a configuration in it; raises as ``framed``."""
     plane, names = _axes(start, motion, plane)
     try:
-        return plane, names, reach(start, question, plane, motion) if plane.given else start
+        return plane, names, reach(start, observation_model, plane, motion) if plane.given else start
     except PoseNotReached as error:
-        name = start.twin.mechanism.name
-        raise PlaneNotMet(name, f"the plane {plane}", str(error).removeprefix(f"{name}: ")) from None
+        name = start.model.mechanism.name
+        raise NoReachablePose(name, f"the plane {plane}", str(error).removeprefix(f"{name}: ")) from None
 
 
 def _last(coarse: Grid, found: Array, axis: int, end: int, met: Callable[[Grid], NDArray[np.bool_]]) -> float:
@@ -244,7 +249,7 @@ def _last(coarse: Grid, found: Array, axis: int, end: int, met: Callable[[Grid],
 def _axes(start: ClosedConfiguration, motion: PlatformMotion, plane: Pose | None) -> tuple[Pose, tuple[str, ...]]:
     """The plane's fixed parts, without those that never change, and the two that vary."""
     plane = plane or Pose()
-    name = start.twin.mechanism.name
+    name = start.model.mechanism.name
     motion.goal(plane, name)
     plane = plane.without(part for part in plane.given if part not in motion.parts)
     fixed = set(plane.given)
@@ -296,14 +301,14 @@ def _valleys(table: Array) -> list[int]:
 
 
 def _same_mode(
-    start: ClosedConfiguration, at: ClosedConfiguration, question: Measurement, motion: PlatformMotion
+    start: ClosedConfiguration, at: ClosedConfiguration, observation_model: ObservationModel, motion: PlatformMotion
 ) -> bool:
     """Whether the pose of ``at`` is singular in the working mode of ``start``, too."""
     try:
-        there = reach(start, question, motion.pose(at.pose(motion.link)), motion)
+        there = reach(start, observation_model, motion.pose(at.pose(motion.link)), motion)
     except PoseNotReached:
         return False
-    return weakest(there, question) < SAME_RELATION
+    return weakest(there, observation_model) < SAME_RELATION
 
 
 def _aside(spots: Array, curve: Array, grid: Grid) -> Array:
@@ -317,15 +322,15 @@ def _aside(spots: Array, curve: Array, grid: Grid) -> Array:
 
 def _spots(grid: Grid, starts: Sequence[ClosedConfiguration], measured: MeasuredRobot) -> Array:
     """Singular poses that lie in the plane, sought from its weakest poses."""
-    motion, question = measured.setting.motion, measured.question
+    motion, observation_model = measured.setup.motion, measured.observation_model
     found: list[list[float]] = []
     for start in starts:
-        at = descend(start, question, measured.pattern, measured.condition)
+        at = descend(start, observation_model, measured.pattern, measured.condition)
         if at is None:
             continue
-        error, _ = motion.goal(grid.fixed).rows(at.twin, at.q)
+        error, _ = motion.goal(grid.fixed).error_and_jacobian(at.model, at.q)
         place = _coordinates(motion, at, grid.names)
         new = all(np.linalg.norm(np.subtract(place, other)) > SAME_SPOT for other in found)
-        if new and np.linalg.norm(error) < ON_PLANE and _same_mode(start, at, question, motion):
+        if new and np.linalg.norm(error) < ON_PLANE and _same_mode(start, at, observation_model, motion):
             found.append(place)
     return np.array(found).reshape(-1, 2)

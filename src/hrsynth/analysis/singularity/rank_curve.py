@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from ...batch.reach import reach
-from ...errors import NotMeasured, PoseNotReached
+from ...batch.pose_continuation import reach
+from ...errors import PoseNotReached, UndefinedValue
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
-from ...kinematics.relation import Measurement
+from ...kinematics.velocity_relation import ObservationModel
 from ...mechanism.pose import Grid
 from .rank_descent import twists_seen
 
@@ -47,7 +47,7 @@ class _Weakest:
 class PlaneOfPoses:
     """A grid of poses and what is measured at them."""
 
-    question: Measurement
+    observation_model: ObservationModel
     motion: PlatformMotion
     grid: Grid
 
@@ -74,8 +74,8 @@ class PlaneOfPoses:
 
     def _weakest(self, at: ClosedConfiguration, place: Array) -> _Weakest | None:
         try:
-            U, sizes, V = np.linalg.svd(twists_seen(at, self.question), full_matrices=False)
-        except NotMeasured:
+            U, sizes, V = np.linalg.svd(twists_seen(at, self.observation_model), full_matrices=False)
+        except UndefinedValue:
             return None
         return _Weakest(at, place, float(sizes[-1]), U[:, -1], V[-1])
 
@@ -97,7 +97,7 @@ class PlaneOfPoses:
     def _between(self, one: _Weakest, other: _Weakest) -> _Weakest | None:
         place = (one.place + other.place) / 2
         try:
-            at = reach(one.at, self.question, self.grid.pose(place.tolist()), self.motion)
+            at = reach(one.at, self.observation_model, self.grid.pose(place.tolist()), self.motion)
         except PoseNotReached:
             return None
         return self._weakest(at, place)

@@ -5,18 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from ...budgets import RANK_STEPS
-from ...errors import NotMeasured
+from ...errors import UndefinedValue
 from ...geometry.gauss_newton import Residual, descend
 from ...geometry.ranks import kernel_basis, range_basis
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.relation import Measurement, Relation, platform_motions, relation
 from ...kinematics.tasks import DAMPING, solve
+from ...kinematics.velocity_relation import ObservationModel, VelocityRelation, platform_motions, relation
 from ...kinematics.walking import STEP, step_along
 from ...tolerances import FOLLOWED, INVERTED, NUDGE, RANK_CUTOFF, SHARP
 
 
-def lose(start: ClosedConfiguration, question: Measurement) -> ClosedConfiguration | None:
+def lose(start: ClosedConfiguration, observation_model: ObservationModel) -> ClosedConfiguration | None:
     """A pose near ``start`` at which the relation itself loses its rank, on steps that follow the branch, not into
     another operation mode; None where there is none near.
 
@@ -25,32 +25,32 @@ def lose(start: ClosedConfiguration, question: Measurement) -> ClosedConfigurati
     """
 
     def evaluate(at: ClosedConfiguration) -> tuple[Array, Array]:
-        rows = twists_seen(at, question)
+        rows = twists_seen(at, observation_model)
         x = np.linalg.svd(rows)[2][-1]
         error = rows @ x
-        aside = [step_from(at, NUDGE * motion) for motion in platform_motions(at, question).T]
-        return error, np.column_stack([(twists_seen(each, question) @ x - error) / NUDGE for each in aside])
+        aside = [step_from(at, NUDGE * motion) for motion in platform_motions(at, observation_model).T]
+        return error, np.column_stack([(twists_seen(each, observation_model) @ x - error) / NUDGE for each in aside])
 
     def advance(at: ClosedConfiguration, found: Residual, factor: float) -> ClosedConfiguration | None:
         normal = found.J.T @ found.J + factor * found.size**2 * np.eye(found.J.shape[1])
         step = np.linalg.lstsq(normal, -(found.J.T @ found.error), rcond=INVERTED)[0]
-        return step_along(at, platform_motions(at, question) @ step / STEP)
+        return step_along(at, platform_motions(at, observation_model) @ step / STEP)
 
     try:
         there, left = descend(start, evaluate, advance, DAMPING, RANK_STEPS, lambda at: at.size <= FOLLOWED)
-    except NotMeasured:
+    except UndefinedValue:
         return None
     return there if left.size <= FOLLOWED else None
 
 
-def twists_seen(at: ClosedConfiguration, question: Measurement) -> Array:
+def twists_seen(at: ClosedConfiguration, observation_model: ObservationModel) -> Array:
     """What is measured of each twist of the platform and, below, the part of the twist that the platform cannot have,
     (rows, twist rows): a matrix that follows the pose without a jump, of the rank of the relation."""
-    M, basis = rates_of_twists(relation(at, question))
+    M, basis = rates_of_twists(relation(at, observation_model))
     return np.vstack([M @ basis.T, np.eye(len(basis)) - basis @ basis.T])
 
 
-def rates_of_twists(found: Relation) -> tuple[Array, Array]:
+def rates_of_twists(found: VelocityRelation) -> tuple[Array, Array]:
     """What is measured of an orthonormal basis of the platform's twists, (measured rows, dof), less what idle motions
     can make of it, and that basis (twist rows, dof)."""
     twists, rates = found.twist_part, found.rates
@@ -66,5 +66,5 @@ def rates_of_twists(found: Relation) -> tuple[Array, Array]:
 
 def step_from(here: ClosedConfiguration, step: Array) -> ClosedConfiguration:
     """Where a step (nv,) leads, closed as sharply as it can be; that it is closed its residual tells."""
-    q, residual = solve(here.twin, here.twin.integrate(here.q, step), tolerance=SHARP)
-    return ClosedConfiguration(here.twin, q, residual)
+    q, residual = solve(here.model, here.model.integrate(here.q, step), tolerance=SHARP)
+    return ClosedConfiguration(here.model, q, residual)

@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 
-from ..words import SENSORS, RobotWord
+from ..architecture_key import SENSORS, ArchitectureKey
 from . import deltas, mixed, planar, pods, schoenflies, sensors, spatial
 
-_LISTED: Mapping[str, Callable[[], Iterable[RobotWord]]] = {
+_LISTED: Mapping[str, Callable[[], Iterable[ArchitectureKey]]] = {
     "planar": planar.words,
     "pods": pods.words,
     "deltas": deltas.words,
@@ -22,7 +22,7 @@ _LISTED: Mapping[str, Callable[[], Iterable[RobotWord]]] = {
 """What each module lists, in no order, some of it twice or of another group."""
 
 
-def group(word: RobotWord) -> str:
+def group(word: ArchitectureKey) -> str:
     """The group to which a word belongs: the first whose law it obeys."""
     if word.seen:
         return SENSORS

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import combinations_with_replacement, product
 
-from ..words import LegWord, RobotWord
+from ..architecture_key import ArchitectureKey, LegKey
 from .legs import leg, pairs, robots
 
 RODS = ("2SSt", "Utn-Unt", "Utn-S")
@@ -15,18 +15,18 @@ BASES = ("Rt*", "Pk*", "Pz*")
 _ENDS = (["2SS"], ["2US"], ["U", "U"], ["U", "S"])
 
 
-def belongs(word: RobotWord) -> bool:
+def belongs(word: ArchitectureKey) -> bool:
     """Whether all legs are an R or a P and then 2SS, 2US, UU or US."""
     return all(
         leg.joints[0].letter in ("R", "P") and [joint.letter for joint in leg.joints[1:]] in _ENDS for leg in word.legs
     )
 
 
-def _legs(bases: tuple[str, ...], rods: tuple[str, ...]) -> list[LegWord]:
+def _legs(bases: tuple[str, ...], rods: tuple[str, ...]) -> list[LegKey]:
     return [leg(f"{base}-{rod}") for base, rod in product(bases, rods)]
 
 
-def words() -> Iterator[RobotWord]:
+def words() -> Iterator[ArchitectureKey]:
     """Two to four legs, alike or mixed; five and six of at most two kinds; rails along one and along three axes of the
     base; rods with U at their upper ends; and articulated platforms with two legs on each plate."""
     kinds = _legs(BASES, RODS)
@@ -40,12 +40,12 @@ def words() -> Iterator[RobotWord]:
         )
         for counts in product(range(3), repeat=3):
             if sum(counts) >= 2:
-                yield RobotWord.of([along] * counts[0] + [across] * counts[1] + [up] * counts[2])
-        yield from (RobotWord.of([along] * count) for count in range(2, 7))
+                yield ArchitectureKey.of([along] * counts[0] + [across] * counts[1] + [up] * counts[2])
+        yield from (ArchitectureKey.of([along] * count) for count in range(2, 7))
     for chain in _legs(BASES, ("2USt",)):
-        yield from (RobotWord.of([chain] * count) for count in range(2, 7))
+        yield from (ArchitectureKey.of([chain] * count) for count in range(2, 7))
     for platform, bases in (("bar", BASES), ("slide", (*BASES, "Px*"))):
         sides = list(combinations_with_replacement(_legs(bases, RODS[:2]), 2))
         for left, right in combinations_with_replacement(sides, 2):
             if left == right or (left[0] == left[1] and right[0] == right[1]):
-                yield RobotWord.of(list(left), list(right), platform=platform)
+                yield ArchitectureKey.of(list(left), list(right), platform=platform)

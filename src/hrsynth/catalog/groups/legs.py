@@ -6,46 +6,46 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations_with_replacement
 
-from ..words import COMPOSITE, MOVED, LegWord, RobotWord, parse
+from ..architecture_key import COMPOSITE, MOVED, ArchitectureKey, LegKey, parse
 
 
-def leg(text: str) -> LegWord:
+def leg(text: str) -> LegKey:
     """The leg that ``text`` writes, as between the brackets of a word."""
     return parse(f"2({text})").legs[0]
 
 
-def drive_each_joint(chain: LegWord, places: Iterable[int]) -> Iterator[LegWord]:
+def drive_each_joint(chain: LegKey, places: Iterable[int]) -> Iterator[LegKey]:
     """The leg with one motor, on each of these joints in turn that can have one."""
     for place in places:
         if chain.joints[place].letter in MOVED:
-            yield LegWord(tuple(replace(joint, motor=i == place) for i, joint in enumerate(chain.joints)))
+            yield LegKey(tuple(replace(joint, motor=i == place) for i, joint in enumerate(chain.joints)))
 
 
-def base_driven(chain: LegWord) -> LegWord:
+def base_driven(chain: LegKey) -> LegKey:
     """The leg with a motor on the first joint that can have one."""
     return next(drive_each_joint(chain, range(len(chain.joints))))
 
 
-def watch_each_segment(chain: LegWord) -> Iterator[LegWord]:
+def watch_each_segment(chain: LegKey) -> Iterator[LegKey]:
     """The leg with each segment observed in turn, one of those that always turn alike."""
     last = len(chain.joints) - (1 if chain.joints[-1].letter in COMPOSITE else 2)
     seen = (
-        LegWord(tuple(replace(joint, watched=i == place) for i, joint in enumerate(chain.joints))).canonical
+        LegKey(tuple(replace(joint, watched=i == place) for i, joint in enumerate(chain.joints))).canonical
         for place in range(last, -1, -1)
     )
     yield from dict.fromkeys(seen)
 
 
-def robots(legs: Sequence[LegWord], count: int, platform: str = "") -> Iterator[RobotWord]:
+def robots(legs: Sequence[LegKey], count: int, platform: str = "") -> Iterator[ArchitectureKey]:
     """All robots with ``count`` of these legs, alike or not."""
     for chosen in combinations_with_replacement(legs, count):
-        yield RobotWord.of(list(chosen), platform=platform)
+        yield ArchitectureKey.of(list(chosen), platform=platform)
 
 
-def pairs(legs: Sequence[LegWord], count: int) -> Iterator[RobotWord]:
+def pairs(legs: Sequence[LegKey], count: int) -> Iterator[ArchitectureKey]:
     """All robots with ``count`` legs of at most two kinds."""
     for i, one in enumerate(legs):
-        yield RobotWord.of([one] * count)
+        yield ArchitectureKey.of([one] * count)
         for other in legs[i + 1 :]:
             for ones in range(1, count):
-                yield RobotWord.of([one] * ones + [other] * (count - ones))
+                yield ArchitectureKey.of([one] * ones + [other] * (count - ones))

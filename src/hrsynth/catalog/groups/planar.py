@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import product
 
+from ..architecture_key import ArchitectureKey, LegKey
 from ..geometry import planar as belongs
-from ..words import LegWord, RobotWord
 from .legs import base_driven, drive_each_joint, leg, robots, watch_each_segment
 
 __all__ = ["belongs", "chains", "words"]
@@ -20,7 +20,7 @@ _OWN = "hj"
 """Names of the P axes of a leg that are not along its line."""
 
 
-def chains(rail: str = "h") -> Iterator[LegWord]:
+def chains(rail: str = "h") -> Iterator[LegKey]:
     """The seven chains of R and P; a P between two R lies along the line of their centres, a first P along ``rail``."""
     for letters in product("RP", repeat=3):
         if letters == ("P", "P", "P"):
@@ -30,7 +30,7 @@ def chains(rail: str = "h") -> Iterator[LegWord]:
         yield leg("-".join(map("".join, zip(letters, names, strict=True))))
 
 
-def with_parallelograms() -> Iterator[LegWord]:
+def with_parallelograms() -> Iterator[LegKey]:
     """Chains of three R, P and Π, with an R, a Π, and a joint of another kind or R or P besides."""
     for letters in product(("R", "P", "Pi"), repeat=3):
         if "R" in letters and "Pi" in letters:
@@ -38,7 +38,7 @@ def with_parallelograms() -> Iterator[LegWord]:
             yield leg("-".join(f"P{next(own)}" if letter == "P" else f"{letter}z" for letter in letters))
 
 
-def _kinds(rail: str, motors: int, tip: str = "RP") -> list[LegWord]:
+def _kinds(rail: str, motors: int, tip: str = "RP") -> list[LegKey]:
     """Chains with each motor on the first ``motors`` joints and each segment observed; with the rail x only those that
     begin with a P."""
     return [
@@ -50,7 +50,7 @@ def _kinds(rail: str, motors: int, tip: str = "RP") -> list[LegWord]:
     ]
 
 
-def words() -> Iterator[RobotWord]:
+def words() -> Iterator[ArchitectureKey]:
     """Robots with three and with two freedoms, of general geometry and with parallel rails; with one leg more than
     freedoms."""
     for rail in ("h", "x"):
@@ -59,9 +59,9 @@ def words() -> Iterator[RobotWord]:
     for chain in with_parallelograms():
         for seen in watch_each_segment(chain):
             for moved in drive_each_joint(seen, range(3)):
-                yield RobotWord.of([moved] * 3)
+                yield ArchitectureKey.of([moved] * 3)
                 if chain.joints[-1].letter == "R":
-                    yield RobotWord.of([moved] * 2, platform="point")
+                    yield ArchitectureKey.of([moved] * 2, platform="point")
     simple, mixed = (
         [base_driven(seen) for chain in kinds for seen in watch_each_segment(chain)]
         for kinds in (chains(), [*chains(), *with_parallelograms()])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..words import RobotWord
+from ..architecture_key import ArchitectureKey
 from .legs import leg, robots
 
 KINDS = tuple(map(leg, ("Utn-Pl*-S", "Utn-Pl*-Unt", "Rt-Pl*-S", "S-Pl*-S", "S-Pl*-Rt", "Pr*-Pz-S", "Cr*-Pz-S")))
@@ -13,7 +13,7 @@ UNCONSTRAINED = 6
 """Freedoms of a leg that constrains nothing."""
 
 
-def belongs(word: RobotWord) -> bool:
+def belongs(word: ArchitectureKey) -> bool:
     """Whether all legs have three joints, the middle one a P, and end on U, S or R, on one rigid platform."""
     return not word.platform and all(
         len(leg.joints) == 3
@@ -26,7 +26,7 @@ def belongs(word: RobotWord) -> bool:
     )
 
 
-def words() -> Iterator[RobotWord]:
+def words() -> Iterator[ArchitectureKey]:
     """Robots of three to six legs, alike or mixed, whose legs leave a freedom by their count; and all legs alike."""
     for count in range(3, 7):
         for word in robots(KINDS, count):

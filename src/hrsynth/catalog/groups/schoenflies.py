@@ -13,13 +13,13 @@ import re
 from collections.abc import Iterator
 from itertools import product
 
-from ..words import LegWord, RobotWord
+from ..architecture_key import ArchitectureKey, LegKey
 from .legs import base_driven, leg, watch_each_segment
 
 LEGS = 4
 
 
-def belongs(word: RobotWord) -> bool:
+def belongs(word: ArchitectureKey) -> bool:
     """Whether four legs of one chain of R, P and U turn about z and horizontal directions of their own alone."""
     axes = {axis for leg in word.legs for joint in leg.joints if joint.letter != "P" for axis in joint.axes}
     return (
@@ -41,7 +41,7 @@ def sequences() -> Iterator[str]:
                 yield letters
 
 
-def chains() -> Iterator[LegWord]:
+def chains() -> Iterator[LegKey]:
     """The legs of each sequence, with and without each U that is not on the base."""
     for letters in sequences():
         own = iter("abc")
@@ -55,7 +55,7 @@ def chains() -> Iterator[LegWord]:
                 yield leg(text)
 
 
-def words() -> Iterator[RobotWord]:
+def words() -> Iterator[ArchitectureKey]:
     """Four legs of each chain, each segment observed."""
     for chain in chains():
-        yield from (RobotWord.of([base_driven(seen)] * LEGS) for seen in watch_each_segment(chain))
+        yield from (ArchitectureKey.of([base_driven(seen)] * LEGS) for seen in watch_each_segment(chain))

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
 
-from ..words import RobotWord, parse, sights
+from ..architecture_key import ArchitectureKey, parse, sights
 
 ROBOTS = (
     "6(Utn-Pl*-S)",
@@ -41,7 +41,7 @@ SEEN = (
 """One camera, or with ' a camera each."""
 
 
-def words() -> Iterator[RobotWord]:
+def words() -> Iterator[ArchitectureKey]:
     """Each robot with each set."""
     for robot, seen in product(ROBOTS, SEEN):
         yield replace(parse(robot), seen=sights(seen))

@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Iterator
 from itertools import product
 
-from ..words import LegWord, RobotWord
+from ..architecture_key import ArchitectureKey, LegKey
 from .legs import drive_each_joint, leg, watch_each_segment
 
 _SLIDES = "hjk"
@@ -22,7 +22,7 @@ CLAVEL = "Rt*-Rt-Pin-Rt"
 """The leg of the Delta robot."""
 
 
-def translational() -> Iterator[LegWord]:
+def translational() -> Iterator[LegKey]:
     """Legs of four or five R and P whose R have the directions a … b … a, at most two P."""
     for count in (4, 5):
         for letters in product("abP", repeat=count):
@@ -35,14 +35,14 @@ def translational() -> Iterator[LegWord]:
             yield leg("-".join(f"P{next(own)}" if letter == "P" else f"R{letter}" for letter in letters))
 
 
-def translates(chain: LegWord) -> bool:
+def translates(chain: LegKey) -> bool:
     """Whether a leg of :func:`translational` moves its end in all translations and turns about each of its directions,
     and nothing is idle: k parallel R give k - 1 translations, at most two."""
     turning = Counter(joint.axes for joint in chain.joints if joint.letter == "R")
     return len(chain.joints) == 3 + len(turning) and max(turning.values()) <= 3
 
 
-def spherical() -> Iterator[LegWord]:
+def spherical() -> Iterator[LegKey]:
     """Legs of three to five R through the common point, up to three of them replaced by parallel ones in one piece."""
     for count in (3, 4, 5):
         for first in range(count):
@@ -53,18 +53,18 @@ def spherical() -> Iterator[LegWord]:
     yield leg("Uon-Pl-Uno")
 
 
-def zero_torsion() -> list[LegWord]:
+def zero_torsion() -> list[LegKey]:
     """Legs that keep the centre of an S in a plane normal to their tangent, the S on the platform or on the base."""
     planes = ("Rt-Rt", "Rt-Pl", "Rt-Pk", "Pz-Rt", "Pk-Rt", "Pr-Rt", "Pr-Pz", "Pz-Pr")
     found = [leg(f"{plane}-S") for plane in planes]
     return found + [leg(text) for text in ("S-Rt-Rt", "S-Pl-Rt")]
 
 
-def words() -> Iterator[RobotWord]:
+def words() -> Iterator[ArchitectureKey]:
     """Three equal legs of each family, each segment observed, each of the first two joints driven; the Clavel leg with
     a Π."""
     for chain in (*translational(), *spherical(), *zero_torsion()):
         for seen in watch_each_segment(chain):
-            yield from (RobotWord.of([each] * 3) for each in drive_each_joint(seen, range(2)))
+            yield from (ArchitectureKey.of([each] * 3) for each in drive_each_joint(seen, range(2)))
     for text in (CLAVEL, "Pk*-Rt-Pin-Rt", "Pz*-Rt-Pin-Rt"):
-        yield from (RobotWord.of([seen] * 3) for seen in watch_each_segment(leg(text)))
+        yield from (ArchitectureKey.of([seen] * 3) for seen in watch_each_segment(leg(text)))

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ...analysis.asked import observe
 from ...analysis.derive import Derivation, derive
+from ...analysis.pose_requests import observe
 from ...description import native
 from ...description.files import replacement
 from ...errors import HrsynthError
@@ -19,12 +19,12 @@ from ...present.report.pages import PORTRAIT
 from ...present.report.pages import robots as derivation_parts
 from ...present.text.catalog import facts, motors
 from ...present.view.view import plane_normal
+from ..architecture_key import parse
 from ..entry import SAMPLES, model, smallest_sets
 from ..executors import Made, Stopped
 from ..geometry import mechanism
 from ..jsonl import Record
 from ..known import alias
-from ..words import parse
 from .folder import FOLDERS
 from .index import render
 from .sentences import answer, rules
@@ -74,12 +74,12 @@ def _portrait(robot: Mechanism, studied: Study) -> Portrait:
     """The robot in space, its watched links and the plane in which it moves marked where they are known."""
     if studied.derivation is None:
         return Portrait.draw(robot, [robot.platform], (), None)
-    setting = studied.derivation.setting
+    setup = studied.derivation.setup
     return Portrait.draw(
         robot,
-        [link for link in setting.anatomy.platform if link in robot.links] or [robot.platform],
+        [link for link in setup.decomposition.platform if link in robot.links] or [robot.platform],
         _known_links(studied.observed, robot) or (),
-        plane_normal(setting.motion),
+        plane_normal(setup.motion),
     )
 
 
@@ -147,7 +147,7 @@ class Study:
     @property
     def observed(self) -> tuple[str, ...] | None:
         """The observed links; None where nothing is known of them."""
-        return None if self.derivation is None else tuple(each.link for each in self.derivation.setting.observed)
+        return None if self.derivation is None else tuple(each.link for each in self.derivation.setup.observed)
 
     def real(self, word: str) -> Mechanism:
         """The robot of an architecture of this structure."""

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any
 
+from ..architecture_key import parse
 from ..jsonl import Record, line
-from ..words import parse
 
 LENGTH = 12
 """Digits of a name: two of a million words are alike with a probability of 2e-3."""

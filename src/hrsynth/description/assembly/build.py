@@ -12,17 +12,17 @@ from ...mechanism.model import FIRST, GIVEN, NAMED, Coupling, Joint, JointType, 
 from ...tolerances import NO_FINER, NOISE, ROUNDED, SAME_GEOMETRY
 from ..jointgraph import JointGraph, JointSpec, comma_list
 from ..jointmotion import cure
+from ..keyframes import STAY, posture
 from ..numerals import Digits
+from ..observation_text import as_written
 from ..overrides import Overrides
-from ..postures import STAY, posture
-from ..sights import as_written
 from ..tree import spanning
-from . import closures, guess
+from . import assumptions, closures
 from .candidates import without_loop
 from .coordinates import with_weighed_motors, without_coordinates
-from .idealise import as_meant
+from .geometry_repair import snap_geometry
 from .loops import LoopAssembly, LoopSolution, Values, regular_values, solve
-from .zero import moves, with_offsets, with_zero_at
+from .zero_configuration import moves, with_offsets, with_zero_at
 
 POSTURE = "from a posture near to closing them: --keyframe NAME of the file, or FILE.srdf:NAME"
 
@@ -40,7 +40,7 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
     closures.join_halves(graph, overrides.named)
     overrides.apply(graph)
     closures.merge_points(graph)
-    base = guess.standing(graph, graph.base or guess.base(graph), overrides.base, overrides.platform)
+    base = assumptions.standing(graph, graph.base or assumptions.base(graph), overrides.base, overrides.platform)
     graph.prune(base)
     for role, link in (("base", overrides.base), ("platform", overrides.platform)):
         if link is not None and link not in graph.links:
@@ -82,7 +82,7 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
     if not all(joint.in_tree for joint in mechanism.joints.values()):
         if not overrides.as_written:
             possible = 0.0 if overrides.tolerance else deviation(graph.digits, length)
-            mechanism = as_meant(mechanism, solution.residual, tolerance, possible)
+            mechanism = snap_geometry(mechanism, solution.residual, tolerance, possible)
         elif solution.residual > SAME_GEOMETRY:
             raise LoopsNotClosed(graph.file, solution.residual, SAME_GEOMETRY, assembly.worst(solution.values)[0])
         mechanism = spanning(mechanism)
@@ -97,10 +97,10 @@ def _platform(graph: JointGraph, overrides: Overrides, base: str) -> tuple[str, 
     """The platform's link, and how it was chosen."""
     if overrides.platform is not None:
         return overrides.platform, GIVEN
-    first = guess.formation(graph, base) if graph.platform is None and graph.formation else graph.platform
+    first = assumptions.formation(graph, base) if graph.platform is None and graph.formation else graph.platform
     if first is not None:
         return first, FIRST if graph.formation else NAMED
-    return guess.platform(graph, overrides.base or base)
+    return assumptions.platform(graph, overrides.base or base)
 
 
 def deviation(digits: Digits, length: float) -> float:

@@ -11,7 +11,7 @@ from .. import formats
 from ..jointgraph import JointGraph, JointSpec
 from ..overrides import Overrides
 from ..reading import robot_file
-from . import closures, guess
+from . import assumptions, closures
 from .candidates import ClosureCandidate, closure_candidates
 
 
@@ -27,7 +27,7 @@ class ImportChoices:
     platforms: tuple[str, ...]
     why: str | None
     told: bool
-    """Whether the first of the platforms is the file's or a guess, not one of several that are as good."""
+    """Whether the first of the platforms is the file's or an assumption, not one of several that are as good."""
     candidates: tuple[ClosureCandidate, ...]
     notes: tuple[Note, ...]
 
@@ -56,7 +56,7 @@ def choices(path: Path, overrides: Overrides) -> ImportChoices:
     closures.join_halves(graph)
     overrides.apply(graph)
     closures.merge_points(graph)
-    base = guess.standing(graph, graph.base or guess.base(graph), overrides.base)
+    base = assumptions.standing(graph, graph.base or assumptions.base(graph), overrides.base)
     graph.prune(base)
     carried = {joint.links[1] for joint in graph.joints.values() if joint.in_tree}
     bases = dict.fromkeys([base, *(link for link in graph.links if link not in carried)])
@@ -75,7 +75,7 @@ def choices(path: Path, overrides: Overrides) -> ImportChoices:
 
 
 def _platforms(graph: JointGraph, base: str) -> tuple[tuple[str, ...], str | None, bool]:
-    """The links that could be the platform: the file's or the guess, what was as good, then those that hold most
+    """The links that could be the platform: the file's or the assumption, what was as good, then those that hold most
     joints."""
     joints = {link: 0 for link in graph.links}
     for joint in graph.joints.values():
@@ -84,5 +84,5 @@ def _platforms(graph: JointGraph, base: str) -> tuple[tuple[str, ...], str | Non
     others = sorted((link for link in graph.links if link != base), key=lambda link: -joints[link])
     if graph.platform is not None:
         return tuple(dict.fromkeys([graph.platform, *others])), None, True
-    found, why = guess.platforms(graph, base)
+    found, why = assumptions.platforms(graph, base)
     return tuple(dict.fromkeys([*found, *others])), why or None, bool(why)

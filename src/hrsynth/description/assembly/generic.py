@@ -21,9 +21,9 @@ from ...mechanism.normal import normal_form
 from ...mechanism.observations.direction import Direction
 from ...mechanism.sensors import defaults_of
 from ...tolerances import RANK_GAP, SOLVED
-from ..postures import STAY
+from ..keyframes import STAY
 from .loops import LoopAssembly, Values
-from .zero import moves, with_zero_at
+from .zero_configuration import moves, with_zero_at
 
 
 @dataclass(frozen=True)
@@ -53,17 +53,17 @@ def with_generic_zero(mechanism: Mechanism) -> Mechanism:
     if all(joint.in_tree for joint in mechanism.joints.values()):
         return mechanism
     try:
-        anatomy = decompose(normal_form(mechanism).mechanism)
+        decomposition = decompose(normal_form(mechanism).mechanism)
     except HrsynthError:
         return mechanism  # what is wrong is told where it is asked about
-    segments = [each for each in defaults_of(anatomy).values() if isinstance(each, Direction)]
+    segments = [each for each in defaults_of(decomposition).values() if isinstance(each, Direction)]
     if not segments:
         return mechanism
     assembly = LoopAssembly.of(mechanism)
     zero = assembly.zero()
 
     def ranks(values: Values) -> tuple[_Ranks, bool]:
-        return _ranks(mechanism, anatomy.point, segments, assembly, values)
+        return _ranks(mechanism, decomposition.point, segments, assembly, values)
 
     here, _ = ranks(zero)
     found: list[tuple[float, float, Values]] = []

@@ -32,8 +32,8 @@ from ...tolerances import (
 )
 from ..jointgraph import (
     ORIGIN,
+    CouplingSpec,
     FrameSpec,
-    GearSpec,
     JointSpec,
     Posture,
     TreeJoint,
@@ -54,7 +54,7 @@ class LoopAssembly:
     ``noise`` an opening may be that of rounded numbers."""
 
     def __init__(
-        self, base: str, joints: Sequence[JointSpec], gears: Sequence[GearSpec] = (), start: Posture | None = None
+        self, base: str, joints: Sequence[JointSpec], gears: Sequence[CouplingSpec] = (), start: Posture | None = None
     ) -> None:
         self.base, self.noise = base, NOISE
         self._start = start or {}
@@ -343,11 +343,11 @@ def joints_of(mechanism: Mechanism) -> list[JointSpec]:
     return found
 
 
-def gears_of(mechanism: Mechanism) -> list[GearSpec]:
+def gears_of(mechanism: Mechanism) -> list[CouplingSpec]:
     """A mechanism's couplings by the joints that carry their links."""
     carrier = {joint.successor: joint.name for joint in mechanism.joints.values() if joint.in_tree}
     return [
-        GearSpec(each.name, carrier[each.predecessor], carrier[each.successor], each.ratio)
+        CouplingSpec(each.name, carrier[each.predecessor], carrier[each.successor], each.ratio)
         for each in mechanism.couplings
     ]
 
@@ -442,7 +442,7 @@ def regular_values(assembly: LoopAssembly, values: Values) -> Values | None:
     return max(found, key=lambda each: each[:2])[2] if found else None
 
 
-def _slip(gear: GearSpec, values: Values) -> Array:
+def _slip(gear: CouplingSpec, values: Values) -> Array:
     """By how much a gear's two coordinates miss each other, (1,)."""
     return values[gear.driven][:1] - gear.ratio * values[gear.driver][:1] - gear.offset
 

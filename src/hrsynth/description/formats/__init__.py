@@ -8,7 +8,7 @@ from functools import cache
 from importlib import import_module
 
 from ...mechanism.model import Mechanism
-from ..dialect import Dialect, Read, RobotFile, Write
+from ..file_format import FileFormat, Read, RobotFile, Write
 from ..jointgraph import JointGraph
 from ..vocabulary import Vocabulary
 
@@ -16,14 +16,14 @@ NATIVE = "native"
 
 
 @cache
-def dialects() -> dict[str, Dialect]:
+def dialects() -> dict[str, FileFormat]:
     """All dialects by name, in the order in which a file is shown to them."""
     folders = [each.name for each in pkgutil.iter_modules(__path__) if each.ispkg]
-    found: list[Dialect] = [import_module(f"{__name__}.{name}").DIALECT for name in folders]
+    found: list[FileFormat] = [import_module(f"{__name__}.{name}").DIALECT for name in folders]
     return {each.name: each for each in sorted(found, key=lambda each: (each.rank, each.name))}
 
 
-def writable() -> list[Dialect]:
+def writable() -> list[FileFormat]:
     """The dialects that are written, the native one first."""
     found = (each for each in dialects().values() if each.endings)
     return sorted(found, key=lambda each: (each.name != NATIVE, each.name))

@@ -12,9 +12,9 @@ from ...mechanism.model import Joint, Mechanism
 from ...mechanism.normal import normal_form
 from ...tolerances import SAME_ROBOT
 from ..elements import inertials
-from ..findings import LintRule, Spot
+from ..findings import LintRule, RuleHit
+from ..linted_file import LintedFile
 from ..matching import LinkFit, RobotMatch
-from ..subject import LintedFile
 
 
 def _match(file: LintedFile) -> RobotMatch | None:
@@ -47,36 +47,38 @@ def _names_of(mine: Joint, theirs: Joint) -> str:
     return repr(mine.name) if mine.name == theirs.name else f"{mine.name!r} ({theirs.name!r} in the other file)"
 
 
-def _joints(file: LintedFile) -> Iterator[Spot]:
+def _joints(file: LintedFile) -> Iterator[RuleHit]:
     match = _match(file)
     if match is None:
         return
     for name, joint in match.one.joints.items():
         if name not in match.joints:
-            yield Spot(joint.line, f"{_what(joint)} {name!r} of type {joint.type} is only in this file")
+            yield RuleHit(joint.line, f"{_what(joint)} {name!r} of type {joint.type} is only in this file")
     taken = set(match.joints.values())
     for name, joint in match.other.joints.items():
         if name not in taken:
-            yield Spot(None, f"{_what(joint)} {name!r} of type {joint.type} is only in the other file")
+            yield RuleHit(None, f"{_what(joint)} {name!r} of type {joint.type} is only in the other file")
 
 
 def _what(joint: Joint) -> str:
     return "joint" if joint.in_tree else "closure"
 
 
-def _types(file: LintedFile) -> Iterator[Spot]:
+def _types(file: LintedFile) -> Iterator[RuleHit]:
     for mine, theirs in _pairs(file):
         if mine.type is not theirs.type:
-            yield Spot(mine.line, f"joint {_names_of(mine, theirs)} is of type {mine.type} here, {theirs.type} there")
+            yield RuleHit(
+                mine.line, f"joint {_names_of(mine, theirs)} is of type {mine.type} here, {theirs.type} there"
+            )
 
 
-def _ends(file: LintedFile) -> Iterator[Spot]:
+def _ends(file: LintedFile) -> Iterator[RuleHit]:
     match = _match(file)
     for mine, theirs in _pairs(file):
         assert match is not None
         here = {match.links.get(link) for link in mine.links}
         if here != set(theirs.links):
-            yield Spot(
+            yield RuleHit(
                 mine.line,
                 f"joint {_names_of(mine, theirs)} joins {' and '.join(mine.links)} here, "
                 f"{' and '.join(theirs.links)} there",
@@ -86,10 +88,10 @@ def _ends(file: LintedFile) -> Iterator[Spot]:
     for role in ("base",) if match.one.open_platform or match.other.open_platform else ("base", "platform"):
         one, two = getattr(match.one, role), getattr(match.other, role)
         if match.links.get(one) != two:
-            yield Spot(match.one.links[one].line, f"the {role} is {one!r} here, {two!r} there")
+            yield RuleHit(match.one.links[one].line, f"the {role} is {one!r} here, {two!r} there")
 
 
-def _geometry(file: LintedFile) -> Iterator[Spot]:
+def _geometry(file: LintedFile) -> Iterator[RuleHit]:
     match = _match(file)
     if match is None:
         return
@@ -97,7 +99,7 @@ def _geometry(file: LintedFile) -> Iterator[Spot]:
         worst = max(fit.misses, key=lambda name: fit.misses[name])
         if fit.misses[worst] > SAME_ROBOT:
             joint = match.one.joints[worst]
-            yield Spot(
+            yield RuleHit(
                 joint.line,
                 f"link {link!r}: its joints do not lie as in the other file; best laid over each "
                 f"other they miss by up to {fit.misses[worst]:.3g} (characteristic lengths, "
@@ -110,14 +112,14 @@ def _geometry(file: LintedFile) -> Iterator[Spot]:
         if all(link in fits and max(fits[link].misses.values()) <= SAME_ROBOT for link in joint.links):
             apart = match.apart(name)
             if apart > SAME_ROBOT:
-                yield Spot(
+                yield RuleHit(
                     joint.line,
                     f"joint {name!r}: its links lie elsewhere along its axis than in the other "
                     f"file, by {apart:.3g} (characteristic lengths)",
                 )
 
 
-def _zero(file: LintedFile) -> Iterator[Spot]:
+def _zero(file: LintedFile) -> Iterator[RuleHit]:
     match = _match(file)
     if match is None:
         return
@@ -137,14 +139,14 @@ def _zero(file: LintedFile) -> Iterator[Spot]:
             if size > SAME_ROBOT:
                 moved.append(name)
     if moved:
-        yield Spot(
+        yield RuleHit(
             None,
             f"the zero configuration is another one: {', '.join(moved[:8])}{' …' * bool(moved[8:])} stand "
             "otherwise in the other file",
         )
 
 
-def _senses(file: LintedFile) -> Iterator[Spot]:
+def _senses(file: LintedFile) -> Iterator[RuleHit]:
     match = _match(file)
     for mine, theirs in _pairs(file):
         assert match is not None
@@ -154,7 +156,7 @@ def _senses(file: LintedFile) -> Iterator[Spot]:
         turned = mine.predecessor != _partner(match, theirs)
         cosine = float(mine.axis @ fit.X[:3, :3] @ theirs.axis) * (-1 if turned else 1)
         if mine.in_tree and theirs.in_tree and cosine < -1 + SAME_ROBOT:
-            yield Spot(mine.line, f"joint {_names_of(mine, theirs)} counts in the opposite sense in the other file")
+            yield RuleHit(mine.line, f"joint {_names_of(mine, theirs)} counts in the opposite sense in the other file")
 
 
 def _partner(match: RobotMatch, theirs: Joint) -> str | None:
@@ -162,17 +164,17 @@ def _partner(match: RobotMatch, theirs: Joint) -> str | None:
     return next((mine for mine, link in match.links.items() if link == theirs.predecessor), None)
 
 
-def _motors(file: LintedFile) -> Iterator[Spot]:
+def _motors(file: LintedFile) -> Iterator[RuleHit]:
     for mine, theirs in _pairs(file):
         if mine.actuated != theirs.actuated:
-            yield Spot(
+            yield RuleHit(
                 mine.line,
                 f"joint {_names_of(mine, theirs)} is {'driven' if mine.actuated else 'passive'} here, "
                 f"{'driven' if theirs.actuated else 'passive'} there",
             )
 
 
-def _limits(file: LintedFile) -> Iterator[Spot]:
+def _limits(file: LintedFile) -> Iterator[RuleHit]:
     for mine, theirs in _pairs(file):
         here, there = (
             (None, None) if each.limits is None else (each.limits.lower, each.limits.upper) for each in (mine, theirs)
@@ -181,14 +183,16 @@ def _limits(file: LintedFile) -> Iterator[Spot]:
             (a is None) != (b is None) or (a is not None and abs(a - (b or 0.0)) > SAME_ROBOT * max(1.0, abs(a)))
             for a, b in zip(here, there, strict=True)
         ):
-            yield Spot(mine.line, f"joint {_names_of(mine, theirs)}: limits {_range(here)} here, {_range(there)} there")
+            yield RuleHit(
+                mine.line, f"joint {_names_of(mine, theirs)}: limits {_range(here)} here, {_range(there)} there"
+            )
 
 
 def _range(limits: tuple[float | None, float | None]) -> str:
     return "none" if limits == (None, None) else " to ".join("…" if each is None else f"{each:.6g}" for each in limits)
 
 
-def _masses(file: LintedFile) -> Iterator[Spot]:
+def _masses(file: LintedFile) -> Iterator[RuleHit]:
     match = _match(file)
     if match is None or file.other is None:
         return
@@ -198,18 +202,18 @@ def _masses(file: LintedFile) -> Iterator[Spot]:
         other, line = theirs.get(name or ""), xml.line(mine.element)
         if other is None:
             if theirs:
-                yield Spot(line, f"link {mine.link!r} has a mass only in this file")
+                yield RuleHit(line, f"link {mine.link!r} has a mass only in this file")
             continue
         a, b = (None if each.mass is None else each.mass.value for each in (mine, other))
         if a is not None and b is not None and abs(a - b) > SAME_ROBOT * abs(a):
-            yield Spot(line, f"link {mine.link!r}: mass {a:g} here, {b:g} there")
+            yield RuleHit(line, f"link {mine.link!r}: mass {a:g} here, {b:g} there")
         if mine.inertia is not None and other.inertia is not None:
             moments = [np.linalg.eigvalsh(each) for each in (mine.inertia, other.inertia)]
             if np.max(np.abs(moments[0] - moments[1])) > SAME_ROBOT * np.max(np.abs(moments[0])):
-                yield Spot(line, f"link {mine.link!r}: principal moments of inertia differ")
+                yield RuleHit(line, f"link {mine.link!r}: principal moments of inertia differ")
 
 
-def _gears(file: LintedFile) -> Iterator[Spot]:
+def _gears(file: LintedFile) -> Iterator[RuleHit]:
     match = _match(file)
     if match is None:
         return
@@ -222,14 +226,14 @@ def _gears(file: LintedFile) -> Iterator[Spot]:
         a, b = mine.get(ends), theirs.get(ends)
         if a is None or b is None or abs(a.ratio - b.ratio) > SAME_ROBOT * abs(a.ratio):
             words = ["no gear" if each is None else f"{each.name!r} with the ratio {each.ratio:g}" for each in (a, b)]
-            yield Spot(None if a is None else a.line, f"{words[0]} here, {words[1]} there")
+            yield RuleHit(None if a is None else a.line, f"{words[0]} here, {words[1]} there")
 
 
 def _rule(
     name: str,
     severity: str,
     title: str,
-    find: Callable[[LintedFile], Iterator[Spot]],
+    find: Callable[[LintedFile], Iterator[RuleHit]],
     explanation: str = "Two files of one robot that differ are two robots.",
 ) -> LintRule:
     return LintRule(f"differs-{name}", severity, title, explanation, "correct the file that is wrong", find)

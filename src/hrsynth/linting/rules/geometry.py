@@ -13,21 +13,21 @@ from ...description.chains import TIP
 from ...geometry.vectors import Array, inverse, pose
 from ...mechanism.model import Joint, Mechanism
 from ...mechanism.observations.direction import SeenAxis
-from ..findings import LintRule, Mend, Spot
-from ..subject import LintedFile
+from ..findings import Fix, LintRule, RuleHit
+from ..linted_file import LintedFile
 
 ROUNDED = re.compile(r"\d+ relations of joints|made to be |the loops are open by up to ")
 """How the reader's notes of such relations begin."""
 
 
-def _rounded(file: LintedFile) -> Iterator[Spot]:
+def _rounded(file: LintedFile) -> Iterator[RuleHit]:
     robot = file.mechanism
     for note in () if robot is None else robot.notes:
         if note.kind == "merged" and ROUNDED.match(note.text):
-            yield Spot(None, note.text, None if robot is None else _as_meant(file, robot))
+            yield RuleHit(None, note.text, None if robot is None else _as_meant(file, robot))
 
 
-def _as_meant(file: LintedFile, robot: Mechanism) -> Mend | None:
+def _as_meant(file: LintedFile, robot: Mechanism) -> Fix | None:
     """What gives every joint of a URDF the place that it is read to have, where each of its joints is one of the
     robot's (or the tip of one) and its zero pose has not moved."""
     graph = file.said
@@ -93,6 +93,6 @@ RULES = (
         "programs that take the digits literally. This program corrects such relations, and says so.",
         "write the numbers with all their digits (in other dialects: hrsynth convert IN OUT)",
         _rounded,
-        mends=True,
+        fixable=True,
     ),
 )

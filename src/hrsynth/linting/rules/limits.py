@@ -11,15 +11,15 @@ from ...description import numerals, xml
 from ...description.formats.native.write import NO_LIMIT
 from ...mechanism.model import JointType
 from ..elements import LimitElement, joints, limits, number
-from ..findings import LintRule, Spot
-from ..subject import LintedFile
+from ..findings import LintRule, RuleHit
+from ..linted_file import LintedFile
 
 
-def _order(file: LintedFile) -> Iterator[Spot]:
+def _order(file: LintedFile) -> Iterator[RuleHit]:
     for each in limits(file):
         if each.bounds is not None and each.bounds[0] > each.bounds[1]:
             lower, upper = each.bounds
-            yield Spot(
+            yield RuleHit(
                 xml.line(each.element),
                 f"joint {each.joint!r}: lower limit {lower:g} above the upper one {upper:g}",
                 partial(_exchange, each),
@@ -34,13 +34,13 @@ def _exchange(limit: LimitElement) -> None:
     limit.upper.put(lower)
 
 
-def _empty(file: LintedFile) -> Iterator[Spot]:
+def _empty(file: LintedFile) -> Iterator[RuleHit]:
     for each in limits(file):
         if each.bounds is not None and each.bounds[0] == each.bounds[1]:
-            yield Spot(xml.line(each.element), f"joint {each.joint!r}: both limits are {each.bounds[0]:g}")
+            yield RuleHit(xml.line(each.element), f"joint {each.joint!r}: both limits are {each.bounds[0]:g}")
 
 
-def _zero(file: LintedFile) -> Iterator[Spot]:
+def _zero(file: LintedFile) -> Iterator[RuleHit]:
     for each in limits(file):
         home = (number(each.owner.get("ref")) or 0.0) if file.dialect == "mjcf" else 0.0
         if (
@@ -48,19 +48,19 @@ def _zero(file: LintedFile) -> Iterator[Spot]:
             and each.bounds[0] < each.bounds[1]
             and not (each.bounds[0] <= home <= each.bounds[1])
         ):
-            yield Spot(
+            yield RuleHit(
                 xml.line(each.element),
                 f"joint {each.joint!r}: its limits {each.bounds[0]:g} to {each.bounds[1]:g} exclude its zero",
             )
 
 
-def _demanded(file: LintedFile) -> Iterator[Spot]:
+def _demanded(file: LintedFile) -> Iterator[RuleHit]:
     if file.dialect != "urdf":
         return
     for joint in joints(file):
         kind = joint.get("type")
         if joint.tag == "joint" and kind in ("revolute", "prismatic") and joint.find("limit") is None:
-            yield Spot(
+            yield RuleHit(
                 xml.line(joint),
                 f"joint {joint.get('name')!r} of type {kind} has no <limit>",
                 partial(_without_range, joint, kind),
@@ -75,12 +75,12 @@ def _without_range(joint: xml.Element, kind: str) -> None:
         etree.SubElement(joint, "limit", {**values, "free": " ".join(NO_LIMIT)})
 
 
-def _unlimited(file: LintedFile) -> Iterator[Spot]:
+def _unlimited(file: LintedFile) -> Iterator[RuleHit]:
     graph = file.said
     for joint in () if graph is None else graph.joints.values():
         open_ended = joint.limits is None or None in (joint.limits.lower, joint.limits.upper)
         if joint.motor is not None and joint.type in (JointType.REVOLUTE, JointType.PRISMATIC) and open_ended:
-            yield Spot(joint.line, f"the driven joint {joint.name!r} has no range")
+            yield RuleHit(joint.line, f"the driven joint {joint.name!r} has no range")
 
 
 RULES = (
@@ -91,7 +91,7 @@ RULES = (
         "No value of the coordinate satisfies both. Some readers refuse the file, others ignore the limits.",
         "exchange the two numbers",
         _order,
-        mends=True,
+        fixable=True,
     ),
     LintRule(
         "limits-empty",
@@ -118,7 +118,7 @@ RULES = (
         "urdfdom, and with it most of ROS, refuses a revolute or prismatic joint without <limit>.",
         "make a revolute joint continuous; give a prismatic one its range",
         _demanded,
-        mends=True,
+        fixable=True,
     ),
     LintRule(
         "motor-unlimited",

@@ -9,20 +9,20 @@ import numpy as np
 
 from ...budgets import MOST_LOOP_COORDINATES
 from ...description import numerals, xml
-from ...description.assembly import guess
+from ...description.assembly import assumptions
 from ...description.assembly.build import rounding
 from ...description.assembly.candidates import closure_candidates
 from ...description.assembly.loops import LoopAssembly, LoopSolution, Values, solve
-from ...description.assembly.zero import count_from, moves
+from ...description.assembly.zero_configuration import count_from, moves
 from ...description.jointgraph import JointGraph, JointSpec
 from ...description.jointmotion import displacement, opening
 from ...errors import HrsynthError
 from ...mechanism.model import Joint, JointType, Mechanism
 from ...tolerances import EXACT, NO_FINER, NOISE, OPPOSITE
 from ..elements import NumberAt
-from ..findings import LintRule, Mend, Spot
+from ..findings import Fix, LintRule, RuleHit
 from ..freedoms import NearbyFreedoms
-from ..subject import LintedFile
+from ..linted_file import LintedFile
 from .names import OWN, removal
 
 CLOSING = ("loop", "constraint", "loop_joint", "joint", "connect", "weld", "coupling")
@@ -42,13 +42,13 @@ def _as_written(file: LintedFile) -> tuple[JointGraph, LoopAssembly] | None:
         file.given.apply(graph)
     except HrsynthError:
         return None
-    base = graph.base or guess.base(graph)
+    base = graph.base or assumptions.base(graph)
     graph.prune(base)
     assembly = LoopAssembly(base, list(graph.joints.values()), graph.gears)
     return None if max(assembly.size, len(assembly.loops)) > MOST_LOOP_COORDINATES else (graph, assembly)
 
 
-def _open(file: LintedFile) -> Iterator[Spot]:
+def _open(file: LintedFile) -> Iterator[RuleHit]:
     found = as_written(file)
     if found is None:
         return
@@ -66,7 +66,7 @@ def _open(file: LintedFile) -> Iterator[Spot]:
     size = ", ".join(f"{name!r} by {miss:.3g}" for name, miss in list(misses.items())[:6] if miss > NOISE)
     text = f"at zero the loops are open: {size} (characteristic lengths, radians)"
     if closed.residual > NOISE:
-        yield Spot(
+        yield RuleHit(
             graph.joints[worst].line,
             text + f"; no way to close them was found (residual {closed.residual:.3g})",
             None,
@@ -74,7 +74,7 @@ def _open(file: LintedFile) -> Iterator[Spot]:
         )
         return
     text += f"; they close with {moves(assembly, closed.values)}"
-    yield Spot(
+    yield RuleHit(
         graph.joints[worst].line,
         text,
         _mend_zero(file, graph, assembly, closed),
@@ -95,7 +95,7 @@ def _miss(joint: JointSpec, poses: dict[str, np.ndarray], length: float) -> floa
     return float(np.linalg.norm([*(error[:gap] / length), *error[gap:]]))
 
 
-def _mend_zero(file: LintedFile, graph: JointGraph, assembly: LoopAssembly, closed: LoopSolution) -> Mend | None:
+def _mend_zero(file: LintedFile, graph: JointGraph, assembly: LoopAssembly, closed: LoopSolution) -> Fix | None:
     """Let every joint that moved count from where it is closed: its origin takes the displacement, its limits and the
     offset of its mimic lose it."""
     if file.dialect != "urdf" or file.expanded or closed.beyond:
@@ -165,7 +165,7 @@ def _opposite(joint: JointSpec, poses: dict[str, np.ndarray]) -> bool:
     return float(X[:3, :3] @ joint.axes[0] @ (Y[:3, :3] @ joint.axes[0])) < -1 + OPPOSITE
 
 
-def _mirrored(file: LintedFile) -> Iterator[Spot]:
+def _mirrored(file: LintedFile) -> Iterator[RuleHit]:
     found = as_written(file)
     if found is None:
         return
@@ -174,12 +174,12 @@ def _mirrored(file: LintedFile) -> Iterator[Spot]:
     for loop in assembly.loops:
         joint = graph.joints[loop.name]
         if _opposite(joint, poses):
-            yield Spot(
+            yield RuleHit(
                 joint.line, f"the two axes of {joint.name!r} point opposite ways at zero", _turn_axis(file, joint)
             )
 
 
-def _turn_axis(file: LintedFile, joint: JointSpec) -> Mend | None:
+def _turn_axis(file: LintedFile, joint: JointSpec) -> Fix | None:
     """Turn the child's axis of a ``<constraint>`` round."""
     element = file.element(joint.line, "constraint", name=joint.name)
     axis = None if element is None else element.find("child_axis")
@@ -199,14 +199,14 @@ def nearby(file: LintedFile) -> NearbyFreedoms | None:
     return None if robot is None else file.remember("freedoms", lambda: NearbyFreedoms(robot))
 
 
-def _dead(file: LintedFile) -> Iterator[Spot]:
+def _dead(file: LintedFile) -> Iterator[RuleHit]:
     found = nearby(file)
     for name in [] if found is None else found.dead():
         graph = file.said
         line = _line(file, name)
         own = None if graph is None else graph.joints.get(name)
         element = None if own is not None and own.in_tree else file.element(line, *CLOSING, name=name)
-        yield Spot(line, f"without {name!r} the mechanism is as free as with it", removal(file, element))
+        yield RuleHit(line, f"without {name!r} the mechanism is as free as with it", removal(file, element))
 
 
 def _line(file: LintedFile, name: str) -> int | None:
@@ -218,7 +218,7 @@ def _line(file: LintedFile, name: str) -> int | None:
     return gears[0].line if gears else None
 
 
-def _redundant(file: LintedFile) -> Iterator[Spot]:
+def _redundant(file: LintedFile) -> Iterator[RuleHit]:
     found = nearby(file)
     if found is None:
         return
@@ -231,7 +231,7 @@ def _redundant(file: LintedFile) -> Iterator[Spot]:
     dead = set(found.dead())
     for name, count in found.redundant(rows).items():
         if name not in dead:
-            yield Spot(
+            yield RuleHit(
                 _line(file, name),
                 f"{count} of the {rows(name)} constraints of {name!r} repeat those of the loops before it",
             )
@@ -249,10 +249,10 @@ def is_watched(robot: Mechanism) -> bool:
     return is_unclosed(robot) and (bool(seen) or all(joint.type is JointType.FREE for joint in robot.joints.values()))
 
 
-def _none(file: LintedFile) -> Iterator[Spot]:
+def _none(file: LintedFile) -> Iterator[RuleHit]:
     robot = file.mechanism
     if robot is not None and is_unclosed(robot) and not is_watched(robot):
-        yield Spot(None, "the file closes no loop")
+        yield RuleHit(None, "the file closes no loop")
 
 
 def _consecutive(graph: JointGraph, one: str, two: str) -> bool:
@@ -272,15 +272,15 @@ def _consecutive(graph: JointGraph, one: str, two: str) -> bool:
     return any(joint.in_tree and joint.links[0] in {one, two} - {*inner} for joint in graph.joints.values() if inner)
 
 
-def _coincide(file: LintedFile) -> Iterator[Spot]:
+def _coincide(file: LintedFile) -> Iterator[RuleHit]:
     graph = file.said
     if graph is None:
         return
     held = graph.closing | {link for joint in graph.joints.values() if not joint.in_tree for link in joint.links}
-    for each in closure_candidates(graph, graph.base or guess.base(file.graph())):
+    for each in closure_candidates(graph, graph.base or assumptions.base(file.graph())):
         one, two = each.links
         if each.coincides and not held & {one, two} and not _consecutive(graph, one, two):
-            yield Spot(
+            yield RuleHit(
                 graph.links[two].line,
                 f"the frames of {one!r} and {two!r} lie {1000 * each.distance:.3g} mm "
                 "apart at zero, and nothing keeps them together when the joints move",
@@ -297,7 +297,7 @@ RULES = (
         "This program finds the nearest closed pose, reports the joints that it moves, and counts from there.",
         "correct the mistyped dimension or, if all are right, measure the joints that moved from where the loops close",
         _open,
-        mends=True,
+        fixable=True,
     ),
     LintRule(
         "loop-mirrored",
@@ -307,7 +307,7 @@ RULES = (
         "its mirror image, or not at all.",
         "reverse one of the two axes",
         _mirrored,
-        mends=True,
+        fixable=True,
     ),
     LintRule(
         "constraint-dead",
@@ -317,7 +317,7 @@ RULES = (
         "numbers may lock the loop.",
         "remove it",
         _dead,
-        mends=True,
+        fixable=True,
     ),
     LintRule(
         "constraint-redundant",

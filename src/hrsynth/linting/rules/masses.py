@@ -13,8 +13,8 @@ from ...mechanism import graphs
 from ...mechanism.model import JointType
 from ...tolerances import NO_BODY
 from ..elements import InertialElement, inertials
-from ..findings import LintRule, Spot
-from ..subject import LintedFile
+from ..findings import LintRule, RuleHit
+from ..linted_file import LintedFile
 from .names import OWN
 
 
@@ -31,10 +31,10 @@ def moving(file: LintedFile) -> set[str]:
     }
 
 
-def _negative(file: LintedFile) -> Iterator[Spot]:
+def _negative(file: LintedFile) -> Iterator[RuleHit]:
     for each in inertials(file):
         if each.mass is not None and (value := each.mass.value) is not None and value < 0:
-            yield Spot(
+            yield RuleHit(
                 xml.line(each.element), f"link {each.link!r} has the mass {value:g}", partial(_without_sign, each)
             )
 
@@ -44,12 +44,12 @@ def _without_sign(inertial: InertialElement) -> None:
     inertial.mass.put((inertial.mass.text or "").lstrip("-"))
 
 
-def _zero(file: LintedFile) -> Iterator[Spot]:
+def _zero(file: LintedFile) -> Iterator[RuleHit]:
     moved = moving(file)
     for each in inertials(file):
         massless = each.mass is None or each.mass.value == 0
         if massless and each.link in moved and each.inertia is not None and np.any(each.inertia):
-            yield Spot(xml.line(each.element), f"link {each.link!r} moves, has an inertia, and no mass")
+            yield RuleHit(xml.line(each.element), f"link {each.link!r} moves, has an inertia, and no mass")
 
 
 def second_moments(inertia: Array) -> tuple[Array, Array]:
@@ -58,14 +58,14 @@ def second_moments(inertia: Array) -> tuple[Array, Array]:
     return np.linalg.eigh(np.trace(inertia) / 2 * np.eye(3) - inertia)
 
 
-def _impossible(file: LintedFile) -> Iterator[Spot]:
+def _impossible(file: LintedFile) -> Iterator[RuleHit]:
     for each in inertials(file):
         if each.inertia is None or not np.any(each.inertia):
             continue
         values, _ = second_moments(each.inertia)
         if values[0] < -NO_BODY * float(np.max(np.abs(each.inertia))):
             moments = ", ".join(f"{value:.4g}" for value in np.linalg.eigvalsh(each.inertia))
-            yield Spot(
+            yield RuleHit(
                 xml.line(each.element),
                 f"link {each.link!r}: principal moments {moments}, of which one is "
                 "negative or larger than the two others together",
@@ -84,7 +84,7 @@ def _nearest(inertial: InertialElement) -> None:
     inertial.write((matrix + matrix.T) / 2)
 
 
-def _missing(file: LintedFile) -> Iterator[Spot]:
+def _missing(file: LintedFile) -> Iterator[RuleHit]:
     known = {each.link for each in inertials(file)}
     graph, root = file.said, file.root
     if not known or graph is None or root is None:
@@ -94,7 +94,7 @@ def _missing(file: LintedFile) -> Iterator[Spot]:
     for name in [name for name in graph.links if name in moved and not OWN.search(name)]:
         line = graph.links[name].line
         if not known & graphs.component(bonds, name) and file.element(line, "link", "body", name=name) is not None:
-            yield Spot(
+            yield RuleHit(
                 line,
                 f"link {name!r} moves and has no <inertial>, as others in the file have, nor has one that "
                 "is fixed to it",
@@ -109,7 +109,7 @@ RULES = (
         "No body has one: simulators refuse the file, or the robot gains energy.",
         "drop the sign",
         _negative,
-        mends=True,
+        fixable=True,
     ),
     LintRule(
         "mass-zero",
@@ -127,7 +127,7 @@ RULES = (
         "inequality). MuJoCo and Gazebo refuse others; elsewhere simulations blow up.",
         "take the nearest inertia that a body can have: negative second moments set to zero",
         _impossible,
-        mends=True,
+        fixable=True,
     ),
     LintRule(
         "inertia-missing",

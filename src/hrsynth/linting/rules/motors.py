@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ...mechanism.model import Mechanism
-from ..findings import LintRule, Spot
+from ..findings import LintRule, RuleHit
 from ..freedoms import Pair
-from ..subject import LintedFile
+from ..linted_file import LintedFile
 from .loops import is_watched, nearby
 
 
@@ -15,38 +15,40 @@ def _held_joints(robot: Mechanism) -> list[Pair]:
     return [joint.links for joint in robot.joints.values() if joint.actuated]
 
 
-def _none(file: LintedFile) -> Iterator[Spot]:
+def _none(file: LintedFile) -> Iterator[RuleHit]:
     robot = file.mechanism
     if robot is not None and not _held_joints(robot) and not is_watched(robot):
-        yield Spot(None, "no joint has a motor")
+        yield RuleHit(None, "no joint has a motor")
 
 
-def _few(file: LintedFile) -> Iterator[Spot]:
+def _few(file: LintedFile) -> Iterator[RuleHit]:
     robot, found = file.mechanism, nearby(file)
     if robot is None or found is None or not _held_joints(robot) or robot.open_platform:
         return
     whole, rest = found.platform(), found.platform(_held_joints(robot))
     if whole and rest:
-        yield Spot(None, f"with all motors held, the platform {robot.platform!r} keeps {rest} of its {whole} freedoms")
+        yield RuleHit(
+            None, f"with all motors held, the platform {robot.platform!r} keeps {rest} of its {whole} freedoms"
+        )
 
 
-def _many(file: LintedFile) -> Iterator[Spot]:
+def _many(file: LintedFile) -> Iterator[RuleHit]:
     robot, found = file.mechanism, nearby(file)
     if robot is None or found is None or not _held_joints(robot):
         return
     driven = sum(joint.type.freedoms for joint in robot.joints.values() if joint.actuated)
     whole, rest = found.count(), found.count(held=_held_joints(robot))
     if whole is not None and rest is not None and driven > whole - rest:
-        yield Spot(None, f"{driven} coordinates are driven, and {whole - rest} of them are independent")
+        yield RuleHit(None, f"{driven} coordinates are driven, and {whole - rest} of them are independent")
 
 
-def _floating(file: LintedFile) -> Iterator[Spot]:
+def _floating(file: LintedFile) -> Iterator[RuleHit]:
     robot = file.mechanism
     if robot is None:
         return
     for name in robot.idle:
         if robot.joints[name].actuated:
-            yield Spot(None, f"motor on the floating joint {name!r}, whose link other joints hold")
+            yield RuleHit(None, f"motor on the floating joint {name!r}, whose link other joints hold")
 
 
 RULES = (

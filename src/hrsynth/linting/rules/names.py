@@ -11,8 +11,8 @@ from ...description import xml
 from ...description.chains import CUT, END, TIP
 from ...mechanism import graphs
 from ..elements import joints
-from ..findings import LintRule, Mend, Spot
-from ..subject import LintedFile
+from ..findings import Fix, LintRule, RuleHit
+from ..linted_file import LintedFile
 
 RESERVED = re.compile(r"__.*__|world|.*::.*")
 """Names that SDFormat keeps for itself."""
@@ -20,17 +20,17 @@ OWN = re.compile(rf"__[123]$|{TIP}$|{CUT}$|{END}$")
 """Ends of the names that this program's writers give to a joint and the link that it carries."""
 
 
-def _clash(file: LintedFile) -> Iterator[Spot]:
+def _clash(file: LintedFile) -> Iterator[RuleHit]:
     if file.root is None or file.dialect == "mjcf":  # in which each kind has names of its own
         return
     links = {each.get("name") for each in file.root.iter("link")}
     for joint in joints(file):
         name = joint.get("name")
         if name in links and not OWN.search(name or ""):
-            yield Spot(xml.line(joint), f"{joint.tag} {name!r} has the name of a link")
+            yield RuleHit(xml.line(joint), f"{joint.tag} {name!r} has the name of a link")
 
 
-def _case(file: LintedFile) -> Iterator[Spot]:
+def _case(file: LintedFile) -> Iterator[RuleHit]:
     graph = file.said
     if graph is None:
         return
@@ -38,17 +38,19 @@ def _case(file: LintedFile) -> Iterator[Spot]:
         often = Counter(name.casefold() for name in table)
         for name in table:
             if often[name.casefold()] > 1:
-                yield Spot(table[name].line, f"{what} {name!r}: another {what} has the same name except for capitals")
+                yield RuleHit(
+                    table[name].line, f"{what} {name!r}: another {what} has the same name except for capitals"
+                )
 
 
-def _reserved(file: LintedFile) -> Iterator[Spot]:
+def _reserved(file: LintedFile) -> Iterator[RuleHit]:
     graph = file.said
     for name, link in graph.links.items() if graph is not None else ():
         if RESERVED.fullmatch(name) and link.line is not None and graph is not None and name != graph.base:
-            yield Spot(link.line, f"link {name!r}")
+            yield RuleHit(link.line, f"link {name!r}")
 
 
-def _motors(file: LintedFile) -> Iterator[Spot]:
+def _motors(file: LintedFile) -> Iterator[RuleHit]:
     if file.root is None:
         return
     names = (
@@ -60,11 +62,11 @@ def _motors(file: LintedFile) -> Iterator[Spot]:
     for each in names:
         name = each.get("name") if isinstance(each.tag, str) else None
         if name is not None and name in seen:
-            yield Spot(xml.line(each), f"motor {name!r}: another one has this name")
+            yield RuleHit(xml.line(each), f"motor {name!r}: another one has this name")
         seen.add(name or "")
 
 
-def _unused(file: LintedFile) -> Iterator[Spot]:
+def _unused(file: LintedFile) -> Iterator[RuleHit]:
     graph = file.said
     if graph is None or len(graph.links) < 2:
         return
@@ -77,12 +79,12 @@ def _unused(file: LintedFile) -> Iterator[Spot]:
         for name in (each for each in graph.links if each in part):
             alone = len(part) == 1 and name not in (graph.base, graph.platform)
             element = file.element(graph.links[name].line, "link", name=name) if alone else None
-            yield Spot(
+            yield RuleHit(
                 graph.links[name].line, f"link {name!r}: no joint connects it to the others", removal(file, element)
             )
 
 
-def removal(file: LintedFile, element: xml.Element | None) -> Mend | None:
+def removal(file: LintedFile, element: xml.Element | None) -> Fix | None:
     """A mend that takes an element out; None where another one names it, and would then name nothing."""
     if element is None:
         return None
@@ -153,6 +155,6 @@ RULES = (
         "Most readers refuse a second root; this one drops what is not connected to the base.",
         "remove it, or add its joint",
         _unused,
-        mends=True,
+        fixable=True,
     ),
 )

@@ -12,8 +12,8 @@ from collections.abc import Iterator
 from lxml import etree
 
 from ...description.jointgraph import comma_list
-from ..findings import LintRule, Spot
-from ..subject import LintedFile
+from ..findings import LintRule, RuleHit
+from ..linted_file import LintedFile
 
 SILENT, REFUSED, READ = "leaves it out without a word", "refuses the file", "reads it"
 TOLD = "leaves it out with a message"
@@ -75,18 +75,18 @@ def closures(file: LintedFile) -> Iterator[tuple[str, int | None]]:
         yield gear.name, gear.line
 
 
-def _dropped(file: LintedFile) -> Iterator[Spot]:
+def _dropped(file: LintedFile) -> Iterator[RuleHit]:
     told: dict[str, list[tuple[str, int | None]]] = {}
     for name, line in closures(file):
         construct = _construct(file, name, line) or ""
         known = CONSTRUCTS.get(construct, {})
         for program in [each for each in file.readers if known.get(each, READ) != READ]:
-            yield Spot(line, f"{name!r} ({construct}): {program} {known[program]}", severity="error")
+            yield RuleHit(line, f"{name!r} ({construct}): {program} {known[program]}", severity="error")
         if not file.readers and any(deed != READ for deed in known.values()):
             told.setdefault(construct, []).append((name, line))
     for construct, every in told.items():
         names = comma_list((repr(name) for name, _ in every), 4)
-        yield Spot(every[0][1], f"{names} ({construct}): {_list_deeds(CONSTRUCTS[construct])}")
+        yield RuleHit(every[0][1], f"{names} ({construct}): {_list_deeds(CONSTRUCTS[construct])}")
 
 
 def _list_deeds(known: dict[str, str]) -> str:

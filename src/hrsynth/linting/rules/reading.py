@@ -7,36 +7,36 @@ from collections.abc import Callable, Iterator
 
 from ...errors import BadRequest, LoopsNotClosed
 from ...tolerances import NOISE
-from ..findings import LintRule, Spot
-from ..subject import LintedFile, defects_of
+from ..findings import LintRule, RuleHit
+from ..linted_file import LintedFile, defects_of
 from .geometry import ROUNDED
 
 
-def _refused(file: LintedFile) -> Iterator[Spot]:
+def _refused(file: LintedFile) -> Iterator[RuleHit]:
     error = file.refusal
     if error is None or isinstance(error, BadRequest):
         return
     if isinstance(error, LoopsNotClosed) and error.residual > NOISE:  # a rule of its own tells it
         return
     for line, text in defects_of(error):
-        yield Spot(line, text)
+        yield RuleHit(line, text)
 
 
-def _asks(file: LintedFile) -> Iterator[Spot]:
+def _asks(file: LintedFile) -> Iterator[RuleHit]:
     if isinstance(file.refusal, BadRequest):
-        yield Spot(None, " ".join(str(file.refusal).removeprefix(f"{file.file}: ").split()))
+        yield RuleHit(None, " ".join(str(file.refusal).removeprefix(f"{file.file}: ").split()))
     elif file.mechanism is not None and file.mechanism.open_platform:
-        yield Spot(None, str(file.mechanism.choice))
+        yield RuleHit(None, str(file.mechanism.choice))
 
 
-def find_notes(*kinds: str, text: str = "") -> Callable[[LintedFile], Iterator[Spot]]:
+def find_notes(*kinds: str, text: str = "") -> Callable[[LintedFile], Iterator[RuleHit]]:
     """What finds the reader's notes of some kinds whose text begins with a pattern."""
 
-    def find(file: LintedFile) -> Iterator[Spot]:
+    def find(file: LintedFile) -> Iterator[RuleHit]:
         robot = file.mechanism
         for note in () if robot is None else robot.notes:
             if note.kind in kinds and re.match(text, note.text):
-                yield Spot(None, note.text)
+                yield RuleHit(None, note.text)
 
     return find
 

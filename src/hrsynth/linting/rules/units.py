@@ -12,8 +12,8 @@ from ...description import numerals, xml
 from ...geometry.vectors import Array
 from ...tolerances import IN_DEGREES, NEARLY_ONE, TURN_IN_RADIANS, UNIT_AXIS
 from ..elements import NumberAt, inertials, joints, limits
-from ..findings import LintRule, Mend, Spot
-from ..subject import LintedFile
+from ..findings import Fix, LintRule, RuleHit
+from ..linted_file import LintedFile
 
 
 def in_degrees(value: float | None) -> bool:
@@ -32,7 +32,7 @@ def _in_radians(value: float | None) -> bool:
     )
 
 
-def _convert(numbers: list[NumberAt]) -> Mend | None:
+def _convert(numbers: list[NumberAt]) -> Fix | None:
     """All of them in radians; None where some are in these, so that nobody knows what the others are."""
     if any(_in_radians(each.value) for each in numbers):
         return None
@@ -44,7 +44,7 @@ def _convert(numbers: list[NumberAt]) -> Mend | None:
     return mend
 
 
-def _limits(file: LintedFile) -> Iterator[Spot]:
+def _limits(file: LintedFile) -> Iterator[RuleHit]:
     if file.dialect == "mjcf":  # in which degrees are the default
         return
     every = [
@@ -57,14 +57,14 @@ def _limits(file: LintedFile) -> Iterator[Spot]:
         if sure or (whole and any(end.value for end in ends)):
             values = " to ".join(str(end.text) for end in ends)
             beside = "" if sure else ", beside others that look like degrees"
-            yield Spot(xml.line(each.element), f"joint {each.joint!r}: limits {values} rad{beside}", _convert(ends))
+            yield RuleHit(xml.line(each.element), f"joint {each.joint!r}: limits {values} rad{beside}", _convert(ends))
 
 
-def _angles(file: LintedFile) -> Iterator[Spot]:
+def _angles(file: LintedFile) -> Iterator[RuleHit]:
     for what, element, ends in _turns(file):
         sure = any(in_degrees(end.value) for end in ends)
         if sure or any(TURN_IN_RADIANS < abs(end.value or 0.0) <= 360 for end in ends):
-            yield Spot(
+            yield RuleHit(
                 xml.line(element),
                 f"rpy {' '.join(str(end.text) for end in ends)}, of {what}",
                 _convert(ends) if sure else None,
@@ -89,23 +89,23 @@ def _turns(file: LintedFile) -> Iterator[tuple[str, xml.Element, list[NumberAt]]
             yield (f"the pose{name}", element, [NumberAt(element, None, place) for place in (3, 4, 5)])
 
 
-def _length(file: LintedFile) -> Iterator[Spot]:
+def _length(file: LintedFile) -> Iterator[RuleHit]:
     robot = file.mechanism
     if robot is None:
         return
     if robot.length > LARGEST_ROBOT:
-        yield Spot(None, f"the joints are {robot.length:.3g} m from their middle on average: are these millimetres?")
+        yield RuleHit(None, f"the joints are {robot.length:.3g} m from their middle on average: are these millimetres?")
     elif robot.length < SMALLEST_ROBOT:
-        yield Spot(None, f"the joints are {robot.length:.3g} m from their middle on average")
+        yield RuleHit(None, f"the joints are {robot.length:.3g} m from their middle on average")
 
 
-def _axis(file: LintedFile) -> Iterator[Spot]:
+def _axis(file: LintedFile) -> Iterator[RuleHit]:
     for joint in joints(file):
         for axis in joint.iterfind("axis") if file.dialect == "urdf" else ():
             vector = _vector(axis.get("xyz"))
             size = 1.0 if vector is None else float(np.linalg.norm(vector))
             if vector is not None and size > 0 and abs(size - 1) > UNIT_AXIS:
-                yield Spot(
+                yield RuleHit(
                     xml.line(axis),
                     f"joint {joint.get('name')!r}: an axis of length {size:.6g}",
                     partial(axis.set, "xyz", numerals.axis(vector)),
@@ -119,7 +119,7 @@ def _vector(text: str | None) -> Array | None:
         return None
 
 
-def _inertia(file: LintedFile) -> Iterator[Spot]:
+def _inertia(file: LintedFile) -> Iterator[RuleHit]:
     robot = file.mechanism
     for each in inertials(file):
         mass = None if each.mass is None else each.mass.value
@@ -127,7 +127,7 @@ def _inertia(file: LintedFile) -> Iterator[Spot]:
             continue
         gyration = float(np.sqrt(max(float(np.max(np.linalg.eigvalsh(each.inertia))), 0.0) / mass))
         if gyration > WIDEST_BODY * robot.length:
-            yield Spot(
+            yield RuleHit(
                 xml.line(each.element),
                 f"link {each.link!r}: mass {mass:g} kg and the inertia of a body "
                 f"{gyration:.3g} m wide, in a robot of {robot.length:.3g} m",
@@ -142,7 +142,7 @@ RULES = (
         "URDF and SDFormat use radians: 90 is fourteen turns, so the limit has no effect.",
         "convert them to radians",
         _limits,
-        mends=True,
+        fixable=True,
     ),
     LintRule(
         "unit-angles",
@@ -151,7 +151,7 @@ RULES = (
         "URDF and SDFormat use radians: 90 is fourteen turns and a bit, so the frame is turned by 116 degrees.",
         "convert them to radians",
         _angles,
-        mends=True,
+        fixable=True,
     ),
     LintRule(
         "unit-length",
@@ -176,6 +176,6 @@ RULES = (
         "This program and most others use only its direction; some scale the joint's speed by its length.",
         "divide it by its length",
         _axis,
-        mends=True,
+        fixable=True,
     ),
 )

@@ -13,12 +13,10 @@ import numpy as np
 from ...geometry.jets import Jet
 from ...geometry.screws import couple, force, normals
 from ...geometry.vectors import Array, Numbers, frozen
-from ..images import tilt_vector
-from ..observation import Drawn
-from ..sights import (
+from ..cameras import (
     CameraObservation,
-    HeldPlace,
-    Sighting,
+    FixedValueLocus,
+    ViewGeometry,
     VirtualJoint,
     apart,
     gimbal,
@@ -27,9 +25,11 @@ from ..sights import (
     ring,
     turned_across,
 )
+from ..images import tilt_vector
+from ..observation import Drawn
 
 
-def circle_chain(at: Sighting, leg: str) -> tuple[VirtualJoint, ...]:
+def circle_chain(at: ViewGeometry, leg: str) -> tuple[VirtualJoint, ...]:
     """U̲P̲-U̲-R: five motors, R about the normal."""
     apart(at, at.B, 0.0, f"circle {leg!r}", "a centre outside of it")
     return (
@@ -40,7 +40,7 @@ def circle_chain(at: Sighting, leg: str) -> tuple[VirtualJoint, ...]:
     )
 
 
-def circle_wrenches(at: Sighting) -> list[Numbers]:
+def circle_wrenches(at: ViewGeometry) -> list[Numbers]:
     """Three forces at the centre, two moments normal to d."""
     return [force(e, at.B) for e in np.eye(3, dtype=int).astype(at.B.dtype)] + [couple(n) for n in normals(at.d)]
 
@@ -56,7 +56,7 @@ class SpaceCircle(CameraObservation):
     size = 6
     rank = 5
     dimension = frozen([1, 1, 1, 0, 0, 0])
-    fed_back = "y − y*: of the centre, of the normal"
+    feature_error = "y − y*: of the centre, of the normal"
     found_by = frozenset({"m", "rad"})
 
     @staticmethod
@@ -90,13 +90,13 @@ class SpaceCircle(CameraObservation):
     def polylines(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
         return (ring(p, d, size / 2),)
 
-    def wrenches(self, at: Sighting) -> list[Numbers]:
+    def wrenches(self, at: ViewGeometry) -> list[Numbers]:
         return circle_wrenches(at)
 
-    def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
+    def chain(self, at: ViewGeometry) -> tuple[VirtualJoint, ...]:
         return circle_chain(at, self.leg)
 
-    def loci(self, at: Sighting) -> tuple[HeldPlace, ...]:
+    def loci(self, at: ViewGeometry) -> tuple[FixedValueLocus, ...]:
         return (kept_in(at.B, at.B, *np.eye(3)), turned_across(at.d, *normals(at.d)))
 
     def pointing(self, values: Array) -> Array | None:

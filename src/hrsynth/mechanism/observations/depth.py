@@ -13,8 +13,8 @@ import numpy as np
 from ...geometry.jets import Jet
 from ...geometry.screws import force
 from ...geometry.vectors import Array, Numbers, plane_axes
+from ..cameras import FixedValueLocus, MetricPoint, ViewGeometry, VirtualJoint, kept_in
 from ..observation import Drawn
-from ..sights import HeldPlace, MetricPoint, Sighting, VirtualJoint, kept_in
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -53,14 +53,14 @@ class PointDepth(MetricPoint):
     def polylines(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
         return ()
 
-    def wrenches(self, at: Sighting) -> list[Numbers]:
+    def wrenches(self, at: ViewGeometry) -> list[Numbers]:
         return [force(at.z, at.B)]
 
-    def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
+    def chain(self, at: ViewGeometry) -> tuple[VirtualJoint, ...]:
         aside = (VirtualJoint("P", at.B, (axis,)) for axis in plane_axes(at.z))
         return VirtualJoint("P", at.B, (at.z,), actuated=True), *aside, VirtualJoint("S", at.B)
 
-    def loci(self, at: Sighting) -> tuple[HeldPlace, ...]:
+    def loci(self, at: ViewGeometry) -> tuple[FixedValueLocus, ...]:
         return (kept_in(at.B, at.B, at.z),)
 
     def pointing(self, values: Array) -> Array | None:

@@ -15,12 +15,12 @@ import numpy as np
 from ...errors import BadMechanism
 from ...geometry.screws import couple, normals
 from ...geometry.vectors import Array, Numbers, cross, frozen, hat, unit
+from ..cameras import FixedValueLocus, ViewGeometry, VirtualJoint, gimbal, relative_pose, turned_across
 from ..images import tilt_vector
 from ..observation import Observation, ObservationRecord
-from ..sights import HeldPlace, Sighting, VirtualJoint, gimbal, relative_pose, turned_across
 
 
-def axis_chain(at: Sighting) -> tuple[VirtualJoint, ...]:
+def axis_chain(at: ViewGeometry) -> tuple[VirtualJoint, ...]:
     """PPP-U̲-R(d): T only translates relative to the reference link, so the first axis of U̲ keeps its direction
     there."""
     turning = gimbal(at.B, at.d, at.far, actuated=True)
@@ -42,7 +42,7 @@ class SeenAxis(Observation):
     rank = 2
     rational = True
     turns_only = True
-    fed_back = "u × u*"
+    feature_error = "u × u*"
     found_by = frozenset({"rad"})
     direction: Array
 
@@ -86,26 +86,26 @@ class SeenAxis(Observation):
         n = u.shape[:-2]
         return (u @ X_reference[..., :3, :3]).reshape(*n, -1), rates.reshape(*n, -1, rates.shape[-1])
 
-    abreast = together
+    batched = together
 
     @property
     def view(self) -> Array:
         """The frame in which the value is told (4, 4), in the reference link's."""
         return frozen(np.eye(4))
 
-    def sighting(self, X_reference: Array, X_link: Array, far: Array | None = None) -> Sighting:
+    def sighting(self, X_reference: Array, X_link: Array, far: Array | None = None) -> ViewGeometry:
         """Where links and axis are, in the base frame."""
-        return Sighting(X_reference[:3, 3], X_reference[:3, 2], X_link[:3, 3], X_link[:3, :3] @ self.direction, far)
+        return ViewGeometry(X_reference[:3, 3], X_reference[:3, 2], X_link[:3, 3], X_link[:3, :3] @ self.direction, far)
 
-    def wrenches(self, at: Sighting) -> list[Numbers]:
+    def wrenches(self, at: ViewGeometry) -> list[Numbers]:
         """Two moments normal to u."""
         return [couple(n) for n in normals(at.d)]
 
-    def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
+    def chain(self, at: ViewGeometry) -> tuple[VirtualJoint, ...]:
         """PPP-U̲-R(d)."""
         return axis_chain(at)
 
-    def loci(self, at: Sighting) -> tuple[HeldPlace, ...]:
+    def loci(self, at: ViewGeometry) -> tuple[FixedValueLocus, ...]:
         return (turned_across(at.d, *normals(at.d)),)
 
     def pointing(self, values: Array) -> Array | None:

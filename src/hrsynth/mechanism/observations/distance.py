@@ -14,8 +14,8 @@ from ...geometry import components
 from ...geometry.jets import Jet
 from ...geometry.screws import force, normals
 from ...geometry.vectors import Array, Numbers, unit
+from ..cameras import FixedValueLocus, MetricPoint, ViewGeometry, VirtualJoint, apart, gimbal, normalise_rates, ring
 from ..observation import Drawn
-from ..sights import HeldPlace, MetricPoint, Sighting, VirtualJoint, apart, gimbal, normalise_rates, ring
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -27,7 +27,7 @@ class PointDistance(MetricPoint):
     locked = "the force along CB"
     size = 1
     rank = 1
-    spot = False
+    images_point = False
 
     @staticmethod
     def measurement(p: Array, d: Array, r: Array) -> Array:
@@ -52,15 +52,15 @@ class PointDistance(MetricPoint):
     def polylines(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
         return ()
 
-    def wrenches(self, at: Sighting) -> list[Numbers]:
+    def wrenches(self, at: ViewGeometry) -> list[Numbers]:
         return [force(at.B - at.C, at.B)]
 
-    def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
+    def chain(self, at: ViewGeometry) -> tuple[VirtualJoint, ...]:
         apart(at, at.B, 0.0, f"distance {self.leg!r}", "a point outside of it")
         return gimbal(at.C, at.ray, None), VirtualJoint("P", at.C, (at.ray,), actuated=True), VirtualJoint("S", at.B)
 
-    def loci(self, at: Sighting) -> tuple[HeldPlace, ...]:
-        return (HeldPlace(at.B, np.zeros((0, 3)), at.C, float(np.linalg.norm(at.B - at.C))),)
+    def loci(self, at: ViewGeometry) -> tuple[FixedValueLocus, ...]:
+        return (FixedValueLocus(at.B, np.zeros((0, 3)), at.C, float(np.linalg.norm(at.B - at.C))),)
 
     def pointing(self, values: Array) -> Array | None:
         return None

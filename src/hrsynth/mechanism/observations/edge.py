@@ -10,21 +10,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import NotMeasured
+from ...errors import UndefinedValue
 from ...geometry import components
 from ...geometry.jets import Jet
 from ...geometry.vectors import Array, Numbers, cross, unit
+from ..cameras import ViewGeometry, VirtualJoint, across, apart, normalise_rates, on_plane
 from ..images import SeenLine, line_fed
-from ..sights import Sighting, VirtualJoint, across, apart, normalise_rates, on_plane
 
 
 def tangent(p: Array, d: Array, r: Array) -> Array:
     """n with n · d = 0, n · p = r, ‖n‖ = 1: the plane of normal n through C touches the cylinder; of the two the one
-    with n · (d × p) > 0. A negative r gives (with −n) the other plane. Raises ``NotMeasured`` where C is inside."""
+    with n · (d × p) > 0. A negative r gives (with −n) the other plane. Raises ``UndefinedValue`` where C is inside."""
     f = p - np.sum(p * d, axis=-1, keepdims=True) * d
     D = np.linalg.norm(f, axis=-1, keepdims=True)
     if not np.all(np.abs(r) < D):
-        raise NotMeasured(
+        raise UndefinedValue(
             "an edge of a cylinder: distance of its axis from the camera's centre (m)",
             float(D.min()),
             f"more than its radius {float(np.abs(r).max()):g}",
@@ -56,7 +56,7 @@ class CylinderEdge(SeenLine):
     words = "an edge of a cylinder of known radius: its tangent plane through C"
     locked = "the force n at the axis, the moment d × n"
     needs = ("at", "axis", "radius")
-    fed_back = "ρ − ρ*, θ − θ*"
+    feature_error = "ρ − ρ*, θ − θ*"
     rational = False
     signed = True
 
@@ -68,7 +68,7 @@ class CylinderEdge(SeenLine):
     def partials(p: Array, d: Array, r: Array) -> tuple[Array | None, Array | None]:
         return tangent_partials(p, d, r)
 
-    def normal(self, at: Sighting) -> Numbers:
+    def normal(self, at: ViewGeometry) -> Numbers:
         return tangent(at.B - at.C, at.d, np.array([self.radius]))
 
     @staticmethod
@@ -86,7 +86,7 @@ class CylinderEdge(SeenLine):
     def error_jets(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
         return line_fed(touching(p, d, r), wanted)
 
-    def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
+    def chain(self, at: ViewGeometry) -> tuple[VirtualJoint, ...]:
         radius = self.radius or 0.0
         apart(at, at.foot, abs(radius), f"edge {self.leg!r}", f"more than the radius {abs(radius):g}")
         n = self.normal(at)

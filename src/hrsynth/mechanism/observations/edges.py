@@ -12,9 +12,9 @@ import numpy as np
 
 from ...geometry.jets import Jet
 from ...geometry.vectors import Array, Numbers
+from ..cameras import CameraObservation, FixedValueLocus, ViewGeometry, VirtualJoint, apart, normalise_rates
 from ..images import line_apart, line_fed, line_slope, shifted_line
 from ..observation import Drawn
-from ..sights import CameraObservation, HeldPlace, Sighting, VirtualJoint, apart, normalise_rates
 from .edge import CylinderEdge, tangent, tangent_partials, touching
 from .line import SpaceLine, line_chain, line_loci, line_wrenches
 
@@ -29,9 +29,9 @@ class CylinderEdges(CameraObservation):
     needs = ("at", "axis", "radius")
     size = 6
     rank = 4
-    fed_back = "ρ − ρ*, θ − θ* of both"
+    feature_error = "ρ − ρ*, θ − θ* of both"
     found_by = frozenset({"px"})
-    spot = False
+    images_point = False
 
     @staticmethod
     def measurement(p: Array, d: Array, r: Array) -> Array:
@@ -72,15 +72,15 @@ class CylinderEdges(CameraObservation):
     def polylines(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
         return CylinderEdges.outline(p, d, r, size).lines
 
-    def wrenches(self, at: Sighting) -> list[Numbers]:
+    def wrenches(self, at: ViewGeometry) -> list[Numbers]:
         return line_wrenches(at)
 
-    def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
+    def chain(self, at: ViewGeometry) -> tuple[VirtualJoint, ...]:
         radius = abs(self.radius or 0.0)
         apart(at, at.foot, radius, f"edges {self.leg!r}", f"more than the radius {radius:g}")
         return line_chain(at)
 
-    def loci(self, at: Sighting) -> tuple[HeldPlace, ...]:
+    def loci(self, at: ViewGeometry) -> tuple[FixedValueLocus, ...]:
         return line_loci(at)
 
     def pointing(self, values: Array) -> Array | None:

@@ -11,8 +11,8 @@ import numpy as np
 from ...geometry.screws import point_velocity
 from ...geometry.so3 import wrap_angle
 from ...geometry.vectors import Array, cross, transform, unit
+from ..cameras import relative_pose
 from ..observation import Drawn, Observation, ObservationRecord
-from ..sights import relative_pose
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -28,7 +28,7 @@ class Encoder(Observation):
     needs = ("joint",)
     size = 1
     rank = 1
-    fed_back = "y − y*, of angles without whole turns"
+    feature_error = "y − y*, of angles without whole turns"
     joint: str
     axis: Array
 
@@ -65,7 +65,7 @@ class AngleEncoder(Encoder):
         normal = self.start - (self.axis @ self.start) * self.axis
         return np.array([np.arctan2(self.axis @ cross(normal, mark), normal @ mark)])
 
-    def apart(self, value: Array, wanted: Array) -> Array:
+    def difference(self, value: Array, wanted: Array) -> Array:
         """The difference without whole turns: at half a turn the angle is π as well as −π."""
         return np.array([wrap_angle(float(value[0] - wanted[0]))])
 

@@ -14,9 +14,9 @@ from ...errors import BadMechanism
 from ...geometry import components
 from ...geometry.jets import Jet
 from ...geometry.vectors import Array, Numbers, dot
+from ..cameras import RING, CameraObservation, ViewGeometry, VirtualJoint, ring
 from ..images import ellipse_fed, ellipse_image, ellipse_slope, shifted_ellipse
 from ..observation import Drawn
-from ..sights import RING, CameraObservation, Sighting, VirtualJoint, ring
 from .circle import circle_chain, circle_wrenches
 
 ROWS, COLUMNS = np.array([0, 1, 2, 1, 2, 2]), np.array([0, 1, 2, 0, 0, 1])
@@ -62,7 +62,7 @@ class ImageCircle(CameraObservation):
     size = 6
     rank = 5
     whole = False
-    fed_back = "centre and second moments of the ellipse"
+    feature_error = "centre and second moments of the ellipse"
     found_by = frozenset({"px"})
 
     @staticmethod
@@ -132,10 +132,10 @@ class ImageCircle(CameraObservation):
     def polylines(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
         return (ring(p, d, r),)
 
-    def wrenches(self, at: Sighting) -> list[Numbers]:
+    def wrenches(self, at: ViewGeometry) -> list[Numbers]:
         return circle_wrenches(at)
 
-    def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
+    def chain(self, at: ViewGeometry) -> tuple[VirtualJoint, ...]:
         if not abs(self.radius or 0.0) > 0:
             raise BadMechanism(f"image_circle {self.leg!r}: radius (m)", self.radius, "more than 0")
         return circle_chain(at, self.leg)

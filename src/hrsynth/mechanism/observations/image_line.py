@@ -13,8 +13,8 @@ import numpy as np
 from ...geometry import components
 from ...geometry.jets import Jet
 from ...geometry.vectors import Array, Numbers, cross, hat, unit
+from ..cameras import ViewGeometry, VirtualJoint, across, apart, normalise_rates, on_plane
 from ..images import SeenLine, line_fed
-from ..sights import Sighting, VirtualJoint, across, apart, normalise_rates, on_plane
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -25,7 +25,7 @@ class ImageLine(SeenLine):
     words = "the plane of C and a line: a line in the image"
     locked = "the force n at the line, the moment d × n"
     needs = ("at", "axis")
-    fed_back = "ρ − ρ*, θ − θ*; x cos θ + y sin θ = ρ"
+    feature_error = "ρ − ρ*, θ − θ*; x cos θ + y sin θ = ρ"
 
     @staticmethod
     def measurement(p: Array, d: Array, r: Array) -> Array:
@@ -36,7 +36,7 @@ class ImageLine(SeenLine):
         turned = normalise_rates(cross(p, d))[1]
         return -turned @ hat(d), turned @ hat(p)
 
-    def normal(self, at: Sighting) -> Numbers:
+    def normal(self, at: ViewGeometry) -> Numbers:
         return cross(at.B - at.C, at.d)
 
     @staticmethod
@@ -54,7 +54,7 @@ class ImageLine(SeenLine):
     def error_jets(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
         return line_fed(components.cross(p, d), wanted)
 
-    def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
+    def chain(self, at: ViewGeometry) -> tuple[VirtualJoint, ...]:
         apart(at, at.foot, 0.0, f"image_line {self.leg!r}", "a line that does not meet it")
         out = unit(at.foot - at.C)
         return across(at, np.cross(out, at.d), out, 1)

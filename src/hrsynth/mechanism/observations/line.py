@@ -15,12 +15,10 @@ from ...geometry.jets import Jet
 from ...geometry.screws import couple, force, normals
 from ...geometry.vectors import Array, Numbers, cross, frozen, hat, plane_axes, unit
 from ...tolerances import LINE_AT_CENTRE
-from ..images import tilt_vector
-from ..observation import Drawn
-from ..sights import (
+from ..cameras import (
     CameraObservation,
-    HeldPlace,
-    Sighting,
+    FixedValueLocus,
+    ViewGeometry,
     VirtualJoint,
     across,
     gimbal,
@@ -29,9 +27,11 @@ from ..sights import (
     stretch,
     turned_across,
 )
+from ..images import tilt_vector
+from ..observation import Drawn
 
 
-def line_chain(at: Sighting) -> tuple[VirtualJoint, ...]:
+def line_chain(at: ViewGeometry) -> tuple[VirtualJoint, ...]:
     """U̲R̲P̲-C; P̲P̲-U̲-C at the point where the line cuts a fixed plane where it meets C."""
     away = at.foot - at.C
     if np.linalg.norm(away) > LINE_AT_CENTRE:
@@ -56,9 +56,9 @@ class SpaceLine(CameraObservation):
     needs = ("at", "axis")
     size = 6
     rank = 4
-    spot = False
+    images_point = False
     dimension = frozen([0, 0, 0, 1, 1, 1])
-    fed_back = "y − y*: of the direction, of the moment"
+    feature_error = "y − y*: of the direction, of the moment"
     found_by = frozenset({"m", "rad"})
 
     @staticmethod
@@ -89,13 +89,13 @@ class SpaceLine(CameraObservation):
     def polylines(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
         return (stretch(p, d, size),)
 
-    def wrenches(self, at: Sighting) -> list[Numbers]:
+    def wrenches(self, at: ViewGeometry) -> list[Numbers]:
         return line_wrenches(at)
 
-    def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
+    def chain(self, at: ViewGeometry) -> tuple[VirtualJoint, ...]:
         return line_chain(at)
 
-    def loci(self, at: Sighting) -> tuple[HeldPlace, ...]:
+    def loci(self, at: ViewGeometry) -> tuple[FixedValueLocus, ...]:
         return line_loci(at)
 
     def pointing(self, values: Array) -> Array | None:
@@ -103,12 +103,12 @@ class SpaceLine(CameraObservation):
         return normalise_rates(values[:, 3:])[0] if sizes.min() > LINE_AT_CENTRE else None
 
 
-def line_loci(at: Sighting) -> tuple[HeldPlace, ...]:
+def line_loci(at: ViewGeometry) -> tuple[FixedValueLocus, ...]:
     """A point on the line, and its direction."""
     return kept_in(at.B, at.B, *normals(at.d)), turned_across(at.d, *normals(at.d))
 
 
-def line_wrenches(at: Sighting) -> list[Numbers]:
+def line_wrenches(at: ViewGeometry) -> list[Numbers]:
     """Two forces and two moments normal to d, at the line."""
     return [wrench for n in normals(at.d) for wrench in (force(n, at.B), couple(n))]
 

@@ -11,11 +11,10 @@ from dataclasses import dataclass
 from ...geometry.jets import Jet
 from ...geometry.screws import force, normals
 from ...geometry.vectors import Array, Numbers, dot
-from ..images import point_image, point_slope, shifted_point, tilt_vector
-from ..sights import (
+from ..cameras import (
     CameraObservation,
-    HeldPlace,
-    Sighting,
+    FixedValueLocus,
+    ViewGeometry,
     VirtualJoint,
     apart,
     depth_plane,
@@ -23,6 +22,7 @@ from ..sights import (
     kept_in,
     normalise_rates,
 )
+from ..images import point_image, point_slope, shifted_point, tilt_vector
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -36,7 +36,7 @@ class ImagePoint(CameraObservation):
     size = 3
     angular = True
     rank = 2
-    fed_back = "x − x*, y − y*; x = X/Z, y = Y/Z"
+    feature_error = "x − x*, y − y*; x = X/Z, y = Y/Z"
     found_by = frozenset({"px", "rad"})
 
     @staticmethod
@@ -77,10 +77,10 @@ class ImagePoint(CameraObservation):
             return shifted_point(value, shocks[0], self.pixels(noise))
         return tilt_vector(value, shocks[0], noise["rad"])
 
-    def wrenches(self, at: Sighting) -> list[Numbers]:
+    def wrenches(self, at: ViewGeometry) -> list[Numbers]:
         return [force(n, at.B) for n in normals(at.B - at.C)]
 
-    def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
+    def chain(self, at: ViewGeometry) -> tuple[VirtualJoint, ...]:
         apart(at, at.B, 0.0, f"point {self.leg!r}", "a point outside of it")
         return (
             gimbal(at.C, at.ray, at.far, actuated=True),
@@ -88,7 +88,7 @@ class ImagePoint(CameraObservation):
             VirtualJoint("S", at.B),
         )
 
-    def loci(self, at: Sighting) -> tuple[HeldPlace, ...]:
+    def loci(self, at: ViewGeometry) -> tuple[FixedValueLocus, ...]:
         return (kept_in(at.B, at.C, *normals(at.ray)),)
 
 

@@ -13,8 +13,18 @@ import numpy as np
 from ...geometry.jets import Jet
 from ...geometry.screws import force
 from ...geometry.vectors import Array, Numbers
+from ..cameras import (
+    FixedValueLocus,
+    MetricPoint,
+    ViewGeometry,
+    VirtualJoint,
+    apart,
+    gimbal,
+    kept_in,
+    normalise_rates,
+    stretch,
+)
 from ..observation import Drawn
-from ..sights import HeldPlace, MetricPoint, Sighting, VirtualJoint, apart, gimbal, kept_in, normalise_rates, stretch
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -47,10 +57,10 @@ class PointPosition(MetricPoint):
         """The ray, and a cross of the camera's axes at its end."""
         return Drawn((np.array([0 * p, p]), *(stretch(p, e, size / 4) for e in np.eye(3))))
 
-    def wrenches(self, at: Sighting) -> list[Numbers]:
+    def wrenches(self, at: ViewGeometry) -> list[Numbers]:
         return [force(e, at.B) for e in np.eye(3, dtype=int).astype(at.B.dtype)]
 
-    def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
+    def chain(self, at: ViewGeometry) -> tuple[VirtualJoint, ...]:
         apart(at, at.B, 0.0, f"position {self.leg!r}", "a point outside of it")
         return (
             gimbal(at.C, at.ray, at.far, actuated=True),
@@ -58,7 +68,7 @@ class PointPosition(MetricPoint):
             VirtualJoint("S", at.B),
         )
 
-    def loci(self, at: Sighting) -> tuple[HeldPlace, ...]:
+    def loci(self, at: ViewGeometry) -> tuple[FixedValueLocus, ...]:
         return (kept_in(at.B, at.B, *np.eye(3)),)
 
     def pointing(self, values: Array) -> Array | None:

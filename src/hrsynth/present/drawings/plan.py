@@ -94,16 +94,19 @@ def plan(
     ``observed`` are names of links (default: those of the mechanism's observations), ``virtual`` names of joints.
     Raises ``BadRequest`` for a leg that is not there.
     """
-    anatomy = mechanism if isinstance(mechanism, LegDecomposition) else _anatomy(mechanism)
+    decomposition = mechanism if isinstance(mechanism, LegDecomposition) else _anatomy(mechanism)
     whole = mechanism.mechanism if isinstance(mechanism, LegDecomposition) else mechanism
     seen = (o.link for o in whole.observations if o.by_segment) if observed is None else observed
     links = frozenset(seen)
     boxes = sorted(boxes_of(whole, links, virtual), key=lambda box: links.isdisjoint((box.tail, box.head)))
-    groups, platform = _groups(whole, anatomy, boxes)
+    groups, platform = _groups(whole, decomposition, boxes)
     if leg is not None:
-        chosen = (anatomy or decompose(whole)).leg(leg)
+        chosen = (decomposition or decompose(whole)).leg(leg)
         own = [box for box in boxes if set(box.joints) <= set(chosen.joints)]
-        groups, platform = [_LegBoxes(leg, tuple(ears(own, (whole.base, chosen.attach))))], (chosen.attach,)
+        groups, platform = (
+            [_LegBoxes(leg, tuple(ears(own, (whole.base, chosen.platform_link))))],
+            (chosen.platform_link,),
+        )
     columns = _columns(groups, whole.base)
     ends = {group.ears[0].links[-1] for group in groups if group.ears}
     spots, ways, rows = _place_groups(groups, columns)
@@ -118,32 +121,32 @@ def _anatomy(mechanism: Mechanism) -> LegDecomposition | None:
 
 
 def _groups(
-    mechanism: Mechanism, anatomy: LegDecomposition | None, boxes: list[Box]
+    mechanism: Mechanism, decomposition: LegDecomposition | None, boxes: list[Box]
 ) -> tuple[list[_LegBoxes], tuple[str, ...]]:
     """The legs in the order of what they end on, the platform's own joints after those of the first end."""
     ends = (mechanism.base, mechanism.platform)
-    everything = [_LegBoxes(None, tuple(ears(boxes, ends)))]
-    if anatomy is None:
-        return everything, (mechanism.platform,)
-    of_leg = {name: leg.label for leg in anatomy.legs for name in leg.joints}
+    all_samples = [_LegBoxes(None, tuple(ears(boxes, ends)))]
+    if decomposition is None:
+        return all_samples, (mechanism.platform,)
+    of_leg = {name: leg.label for leg in decomposition.legs for name in leg.joints}
     members: dict[str | None, list[Box]] = {}
     for box in boxes:
         members.setdefault(of_leg.get(box.joints[0]), []).append(box)
-    platform = set(anatomy.platform)
+    platform = set(decomposition.platform)
     inner = members.pop(None, [])
     if any(not {box.tail, box.head, *box.inside} <= platform for box in inner):
-        return everything, (mechanism.platform,)
-    attached = tuple(dict.fromkeys(leg.attach for leg in anatomy.legs))
+        return all_samples, (mechanism.platform,)
+    attached = tuple(dict.fromkeys(leg.platform_link for leg in decomposition.legs))
     groups: list[_LegBoxes] = []
     for attach in attached:
         groups += [
             _LegBoxes(leg.label, tuple(ears(members.get(leg.label, ()), (mechanism.base, attach))))
-            for leg in anatomy.legs
-            if leg.attach == attach
+            for leg in decomposition.legs
+            if leg.platform_link == attach
         ]
         if attach == attached[0] and inner:
             groups.append(_LegBoxes(None, tuple(ears(inner, attached))))
-    return groups, anatomy.platform
+    return groups, decomposition.platform
 
 
 def _columns(groups: Sequence[_LegBoxes], base: str) -> dict[str, int]:

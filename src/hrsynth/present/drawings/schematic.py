@@ -121,8 +121,8 @@ def leg_svg(
 def derivation_svg(found: Derivation) -> bytes:
     """The schemes of both robots side by side, the architecture over each; the real one alone where every leg is
     blind."""
-    watched = [o.link for o in found.setting.observed]
-    schemes = [(f"real robot  {found.architecture}", robot_svg(found.setting.anatomy, observed=watched))]
+    watched = [o.link for o in found.setup.observed]
+    schemes = [(f"real robot  {found.architecture}", robot_svg(found.setup.decomposition, observed=watched))]
     if found.hidden is not None:
         motors = [joint.name for joint in found.hidden.joints.values() if joint.actuated]
         schemes.append((f"hidden robot  {found.hidden_architecture}", robot_svg(found.hidden, virtual=motors)))

@@ -14,10 +14,10 @@ from .parts import Parts, Refused
 
 def answer(found: Derivation, told: Parts) -> Iterator[str]:
     """A sentence for each question that has an answer."""
-    yield describe_seen(found.verdict, found.setting.labels, found.setting)
+    yield describe_seen(found.verdict, found.setup.labels, found.setup)
     if not isinstance(told.legs, Refused):
         best = max(each.rank for each in told.legs.sets)
-        yield fewest(told.legs.minimal, things(found.setting), best, found.dof)
+        yield fewest(told.legs.minimal, things(found.setup), best, found.dof)
     if not isinstance(told.singularity, Refused):
         yield where_lost(told.singularity.words)
     if not isinstance(told.modes, Refused) and (poses := alike(told.modes)) is not None:
@@ -28,7 +28,7 @@ def answer(found: Derivation, told: Parts) -> Iterator[str]:
 
 def good(found: Verdict) -> bool:
     """Whether all is seen that can be: of a formation all but its trivial motions."""
-    return not found.lost and (found.rank == found.dof if found.formation is None else not found.formation.flexes)
+    return not found.unobserved and (found.rank == found.dof if found.formation is None else not found.formation.flexes)
 
 
 def set_rows(found: Legs, most: int) -> Iterator[tuple[tuple[str, ...], Verdict, str, bool]]:

@@ -43,14 +43,14 @@ def actuators(found: Derivation) -> set[str]:
 
 def pairs(found: Derivation) -> list[LegPair]:
     """The legs in order, each kind once."""
-    real, seen = found.setting.anatomy, {o.link for o in found.setting.observed}
+    real, seen = found.setup.decomposition, {o.link for o in found.setup.observed}
     states = [step.state for step in found.steps if step.state is not None]
-    hidden = states[-1].anatomy() if states and found.hidden is not None else None
+    hidden = states[-1].decomposition() if states and found.hidden is not None else None
     kinds: dict[tuple[str, str | None, bool], LegPair] = {}
     for leg in real.legs:
         other = None if hidden is None or leg.label not in hidden.labels else hidden.leg(leg.label)
         word = hidden.word(other).text() if hidden is not None and other is not None else None
-        key = real.word(leg).text(), word, leg.label in found.setting.labels
+        key = real.word(leg).text(), word, leg.label in found.setup.labels
         if key in kinds:
             kinds[key] = replace(kinds[key], labels=(*kinds[key].labels, leg.label))
             continue
@@ -108,13 +108,13 @@ class StepFigure:
 def step_figures(found: Derivation) -> list[StepFigure]:
     """The accepted steps that changed the robot, in order."""
     drawn: list[StepFigure] = []
-    seen, anatomy = {o.link for o in found.setting.observed}, found.setting.anatomy
+    seen, decomposition = {o.link for o in found.setup.observed}, found.setup.decomposition
     virtual: set[str] = set()
     for number, step in enumerate(found.steps, 1):
         if step.state is None:
             continue
-        after, then = step.state.anatomy(), step.state.actuators
-        leg = step.leg if step.leg in anatomy.labels and step.leg in after.labels else None
+        after, then = step.state.decomposition(), step.state.actuators
+        leg = step.leg if step.leg in decomposition.labels and step.leg in after.labels else None
         one = StepFigure(
             step.rule,
             SOURCES.get(step.rule, ""),
@@ -122,7 +122,7 @@ def step_figures(found: Derivation) -> list[StepFigure]:
             (step.leg,) if step.leg else (),
             (step.reason,),
             step.largest_angle,
-            _picture(step, "before", anatomy, leg, seen, virtual),
+            _picture(step, "before", decomposition, leg, seen, virtual),
             _picture(step, "after", after, leg, seen, then),
         )
         alike = next((i for i, other in enumerate(drawn) if one.alike(other)), None)
@@ -130,14 +130,19 @@ def step_figures(found: Derivation) -> list[StepFigure]:
             drawn.append(one)
         else:
             drawn[alike] = drawn[alike].together(one)
-        anatomy, virtual = after, then
+        decomposition, virtual = after, then
     return drawn
 
 
 def _picture(
-    step: Step, word: str, anatomy: LegDecomposition, leg: str | None, seen: Collection[str], virtual: Collection[str]
+    step: Step,
+    word: str,
+    decomposition: LegDecomposition,
+    leg: str | None,
+    seen: Collection[str],
+    virtual: Collection[str],
 ) -> str:
     title = f"{step.rule}: {word}" + (f" (leg {leg})" if leg else "")
     if leg is None:
-        return robot_svg(anatomy, observed=seen, virtual=virtual, title=title)
-    return leg_svg(anatomy, leg, observed=seen, virtual=virtual, title=title)
+        return robot_svg(decomposition, observed=seen, virtual=virtual, title=title)
+    return leg_svg(decomposition, leg, observed=seen, virtual=virtual, title=title)

@@ -34,21 +34,21 @@ PORTRAIT = (420.0, 330.0)
 
 def robots(found: Derivation) -> dict[str, Any]:
     """What the page of any robot says of it and of its derivation, by name in the template."""
-    name, observed = found.robot.name, [o.link for o in found.setting.observed]
-    graphs = [robot_svg(found.setting.anatomy, observed=observed, title=f"Scheme of the real robot {name}")]
+    name, observed = found.robot.name, [o.link for o in found.setup.observed]
+    graphs = [robot_svg(found.setup.decomposition, observed=observed, title=f"Scheme of the real robot {name}")]
     if found.hidden is not None:
         title = f"Scheme of the hidden robot of {name}"
         graphs.append(robot_svg(found.hidden, observed=observed, virtual=actuators(found), title=title))
     return {
         "found": found,
-        "setting": found.setting,
-        "portrait": Portrait.of(found.setting).svg(*PORTRAIT),
+        "setup": found.setup,
+        "portrait": Portrait.of(found.setup).svg(*PORTRAIT),
         "name": name,
         "graphs": graphs,
         "real": str(found.architecture),
         "hidden": found.hidden_architecture and str(found.hidden_architecture),
-        "things": things(found.setting),
-        "watched": ["leg " * o.by_segment + label_of(o) for o in found.setting.observed],
+        "things": things(found.setup),
+        "watched": ["leg " * o.by_segment + label_of(o) for o in found.setup.observed],
     }
 
 
@@ -67,11 +67,11 @@ def page(found: Derivation, told: Parts) -> bytes:
             errors=None
             if isinstance(errors, Refused)
             else (
-                f"{errors.blur.inside} of {noise_words(errors)}"
-                if errors.blur.noise is None
-                else f"{errors.blur.inside}, {noise_words(errors)}"
+                f"{errors.bounds.inside} of {noise_words(errors)}"
+                if errors.bounds.noise is None
+                else f"{errors.bounds.inside}, {noise_words(errors)}"
             ),
-            held=describe_held(found.setting),
+            held=describe_held(found.setup),
             scenes=step_figures(found),
             modes_picture=None
             if isinstance(modes, Refused) or why_undrawn(modes) is not None

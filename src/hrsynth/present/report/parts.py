@@ -10,16 +10,16 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from ...analysis.accuracy.accuracy import Accuracy, sees_all
-from ...analysis.accuracy.cones import Blur
 from ...analysis.accuracy.error_map import Mapper
+from ...analysis.accuracy.measurement_bounds import MeasurementBounds
 from ...analysis.controllability import Legs, legs
 from ...analysis.derive import Derivation
 from ...analysis.modes.modes import AssemblyModes, modes
 from ...analysis.observed import ObservedRobot
-from ...analysis.singularity.singular import Singularity, singular
+from ...analysis.singularity.singularities import Singularity, singularities
 from ...errors import BadRequest, HrsynthError
+from ...mechanism.cameras import CameraObservation
 from ...mechanism.pose import Pose
-from ...mechanism.sights import CameraObservation
 from ..view.scale import CONE_TEXT
 
 POINTS = 500
@@ -52,12 +52,12 @@ class Parts:
 def parts(found: Derivation, seed: int) -> Parts:
     """Ask for each part of a derivation's report, of the robot as it was observed for the derivation; ``seed`` is that
     of the derivation."""
-    setting, name = found.setting, found.robot.name
+    setup, name = found.setup, found.robot.name
     return Parts(
-        ask(name, lambda: legs(setting, seed=seed)),
-        ask(name, lambda: singular(setting, points=POINTS, seed=seed)),
-        ask(name, lambda: modes(setting, seed=seed)),
-        ask(name, lambda: error_plane(setting, seed)),
+        ask(name, lambda: legs(setup, seed=seed)),
+        ask(name, lambda: singularities(setup, points=POINTS, seed=seed)),
+        ask(name, lambda: modes(setup, seed=seed)),
+        ask(name, lambda: error_plane(setup, seed)),
     )
 
 
@@ -74,16 +74,16 @@ def reason(error: HrsynthError, robot: str) -> str:
     return (error.what if isinstance(error, BadRequest) else str(error)).removeprefix(f"{robot}: ")
 
 
-def error_plane(setting: ObservedRobot, seed: int) -> Accuracy:
+def error_plane(setup: ObservedRobot, seed: int) -> Accuracy:
     """The error maxima over a plane of poses through the zero configuration."""
     units: set[str] = set()
-    for each in setting.observed:
+    for each in setup.observed:
         focal = isinstance(each, CameraObservation) and each.camera is not None and each.camera.focal
         in_picture = "px" in each.found_by and (focal or len(each.found_by) == 1)
         units |= {"px"} if in_picture else each.found_by - {"px"}
     usual = ",".join(noise for noise, unit in ((CONE_TEXT, "rad"), (PIXELS, "px"), (LENGTHS, "m")) if unit in units)
-    blur = Blur.of(None, usual, setting.observed)
-    sees_all(setting)
-    mapper = Mapper(setting, blur)
+    blur = MeasurementBounds.of(None, usual, setup.observed)
+    sees_all(setup)
+    mapper = Mapper(setup, blur)
     grid = mapper.plane(Pose(), COARSE_MAP_SIDE if mapper.batch is None else MAP_SIDE)
-    return Accuracy(setting, blur, (), (), mapper.over(grid, seed))
+    return Accuracy(setup, blur, (), (), mapper.over(grid, seed))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...analysis.observed import ObservedRobot
-from ...batch.reach import reach
+from ...batch.pose_continuation import reach
 from ...errors import HrsynthError
 from ...index import options
 from ...kinematics.configuration import ClosedConfiguration
@@ -51,32 +51,32 @@ def lines(request: Request, name: str, *more: str, watching: bool = True, **give
     return {"command": shlex.join([*words, *more]), "python": f"hrsynth.{name}({', '.join([robot, *python])})"}
 
 
-def at_pose(setting: ObservedRobot, at: ClosedConfiguration) -> str:
+def at_pose(setup: ObservedRobot, at: ClosedConfiguration) -> str:
     """The platform's pose as an option says it, to nine digits."""
-    given = setting.motion.pose(at.pose(setting.motion.link)).given
+    given = setup.motion.pose(at.pose(setup.motion.link)).given
     return ",".join(f"{name}={'/'.join(map(digits, values))}" for name, values in given.items())
 
 
-def same_at(setting: ObservedRobot, *at: ClosedConfiguration) -> bool:
+def same_at(setup: ObservedRobot, *at: ClosedConfiguration) -> bool:
     """Whether a command that is told the poses of these configurations is at them: not at those of another mode, or to
     which no small steps lead from the zero configuration."""
-    drawn, motion = setting.everything, setting.motion
+    drawn, motion = setup.all_samples, setup.motion
     for each in at:
         if np.array_equal(each.q, drawn.start.q):
             continue
         try:
-            there = reach(drawn.start, drawn.question, motion.pose(each.pose(motion.link)), motion)
+            there = reach(drawn.start, drawn.observation_model, motion.pose(each.pose(motion.link)), motion)
         except HrsynthError:
             return False
-        if np.linalg.norm(drawn.question.target(there).rows(each.twin, each.q)[0]) > AS_PRINTED:
+        if np.linalg.norm(drawn.observation_model.target(there).error_and_jacobian(each.model, each.q)[0]) > AS_PRINTED:
             return False
     return True
 
 
-def lines_at(request: Request, name: str, setting: ObservedRobot, here: ClosedConfiguration) -> dict[str, str]:
+def lines_at(request: Request, name: str, setup: ObservedRobot, here: ClosedConfiguration) -> dict[str, str]:
     """The lines of a question that is asked at a configuration, none where no command is at it."""
-    pose = at_pose(setting, here)
-    return lines(request, name, at=pose) if same_at(setting, here) else NONE
+    pose = at_pose(setup, here)
+    return lines(request, name, at=pose) if same_at(setup, here) else NONE
 
 
 def digits(value: float) -> str:

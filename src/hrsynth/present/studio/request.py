@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.asked import observe
 from ...analysis.derive import Derivation, derive
 from ...analysis.observed import ObservedRobot
+from ...analysis.pose_requests import observe
 from ...budgets import FARTHEST_POSE, LARGEST_STUDIO_LIST, LONGEST_STUDIO_NAME, REMEMBERED
-from ...description import load, shipped
+from ...description import list_robots, load
 from ...description.example_data import PREFIX
 from ...errors import BadRequest, LoopsNotClosed
 from ...geometry.vectors import Array
@@ -52,8 +52,8 @@ def _load(source: RobotSource) -> Mechanism:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Request(Value):
-    """A question's ``fields``, and where its robots lie (see :class:`.desk.Desk`). Every field is read by one of these
-    methods; all raise ``BadRequest`` in one line."""
+    """A question's ``fields``, and where its robots lie (see :class:`.desk.AnalysisService`). Every field is read by
+    one of these methods; all raise ``BadRequest`` in one line."""
 
     fields: Mapping[str, Any]
     folder: Path | None = None
@@ -102,7 +102,7 @@ class Request(Value):
         kind, _, name = _text("source of a robot", said.get("source", "")).partition(":")
         options = _options(said.get("options"))
         if kind == SHIPPED:
-            if name not in shipped():
+            if name not in list_robots():
                 raise BadRequest("no such shipped robot", name, "what the gallery lists")
             return RobotSource(name, options)
         if kind == GIVEN and not name:
@@ -141,7 +141,7 @@ class Request(Value):
         return self.text("camera")
 
     @cached_property
-    def setting(self) -> ObservedRobot:
+    def setup(self) -> ObservedRobot:
         """The robot with what is watched of it; with all legs where none is."""
         return observe(self.mechanism, self.watched or None, self.camera).by_segments("the studio")
 
@@ -154,7 +154,7 @@ class Request(Value):
         """The robot with what is watched of it; raises ``BadRequest`` where no leg is."""
         if self.blind:
             raise BadRequest("nothing is observed", "no leg", "leg labels, links, or all")
-        return self.setting
+        return self.setup
 
     @cached_property
     def derivation(self) -> Derivation:
@@ -164,7 +164,7 @@ class Request(Value):
     def mover(self, hidden: bool = False) -> Mover:
         """What moves the robot, and with ``hidden`` its hidden robot beside it."""
         other = self.derivation.hidden if hidden and not self.blind else None
-        return _mover(self.setting, other)
+        return _mover(self.setup, other)
 
     @property
     def ends(self) -> tuple[tuple[Posed, Posed], ...]:
@@ -181,10 +181,10 @@ class Request(Value):
             return mover.home
         if not isinstance(found, dict):
             raise BadRequest(field, found, "what an answer has there, or null")
-        twin = mover.home.real.twin
-        q = _configuration(twin, found.get("q"))
+        model = mover.home.real.model
+        q = _configuration(model, found.get("q"))
         try:
-            at = ClosedConfiguration.of(twin, q)
+            at = ClosedConfiguration.of(model, q)
         except LoopsNotClosed as error:
             raise BadRequest(
                 f"{field}: the loops are not closed, residual", f"{error.residual:.2g}", f"up to {error.tolerance:g}"
@@ -192,7 +192,7 @@ class Request(Value):
         other = found.get("hidden")
         if mover.hidden is None:
             return Posed(at)
-        if isinstance(other, dict) and other.get("legs") == list(self.setting.labels):
+        if isinstance(other, dict) and other.get("legs") == list(self.setup.labels):
             q = _configuration(mover.hidden, other.get("q"))
             posed = mover.beside(at, q)
             if posed is None:
@@ -204,13 +204,13 @@ class Request(Value):
 
     def describe_here(self, posed: Posed) -> dict[str, Any]:
         """The field ``here`` of an answer."""
-        hidden = None if posed.hidden is None else {"legs": list(self.setting.labels), "q": posed.hidden.tolist()}
+        hidden = None if posed.hidden is None else {"legs": list(self.setup.labels), "q": posed.hidden.tolist()}
         return {"q": posed.real.q.tolist(), "hidden": hidden}
 
 
 @lru_cache(maxsize=REMEMBERED)
-def _mover(setting: ObservedRobot, hidden: Mechanism | None) -> Mover:
-    return Mover.of(setting, hidden)
+def _mover(setup: ObservedRobot, hidden: Mechanism | None) -> Mover:
+    return Mover.of(setup, hidden)
 
 
 def inside(root: Path, name: str) -> Path:
@@ -290,9 +290,9 @@ def _vector(name: str, found: Any, size: int) -> Array:
     return np.array([_number(name, each, -FARTHEST_POSE, FARTHEST_POSE) for each in found])
 
 
-def _configuration(twin: PinocchioModel, found: Any) -> Array:
+def _configuration(model: PinocchioModel, found: Any) -> Array:
     """A configuration of a twin: its size, finite, with unit quaternions."""
-    q = _vector("here: coordinates", found, len(twin.q0))
-    if not twin.is_normalized(q):
+    q = _vector("here: coordinates", found, len(model.q0))
+    if not model.is_normalized(q):
         raise BadRequest("here: a turn", None, "a unit quaternion")
     return q

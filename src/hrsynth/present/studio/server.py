@@ -93,13 +93,13 @@ def view_server(found: View, port: int = 0, open_: bool = True, source: dict[str
     Raises as :func:`studio`."""
     from ...description.overrides import names
 
-    if not all(seen.by_segment for seen in found.setting.observed):
+    if not all(seen.by_segment for seen in found.setup.observed):
         raise BadRequest(
             "a view that is served knows directions of segments only",
-            ", ".join(found.setting.labels),
+            ", ".join(found.setup.labels),
             "a page that needs no server (--static view.html, View.save)",
         )
-    robot = found.setting.robot
+    robot = found.setup.robot
     if source is None or "/" in (source["keyframe"] or ""):  # the page names no files
         given = _as_read(robot)
     else:
@@ -111,8 +111,8 @@ def view_server(found: View, port: int = 0, open_: bool = True, source: dict[str
         }
         given = {"robot": source["robot"], "options": options}
     first = {
-        "watch": [seen.link for seen in found.setting.observed],
-        "camera": found.setting.robot.camera,
+        "watch": [seen.link for seen in found.setup.observed],
+        "camera": found.setup.robot.camera,
         "hidden": found.derivation is not None,
     }
     server = StudioServer(
@@ -125,11 +125,11 @@ def view_server(found: View, port: int = 0, open_: bool = True, source: dict[str
 
 def _as_read(robot: Mechanism) -> dict[str, Any] | None:
     """A robot by its file, or the name of a shipped one, where it is just what that says."""
-    from ...description import load, shipped
+    from ...description import list_robots, load
 
     if robot.file is None:
         return None
-    known = {path.resolve(): name for name, path in shipped().items()}
+    known = {path.resolve(): name for name, path in list_robots().items()}
     name = known.get(Path(robot.file).resolve(), robot.file)
     try:
         read = load(name)

@@ -20,7 +20,7 @@ def branch(found: BranchProof) -> str:
         ("motors", ", ".join(found.motors)),
         (
             "passive",
-            f"{len(found.passive)} coordinates" + (f", {len(found.held)} idle ones held" if found.held else ""),
+            f"{len(found.passive)} coordinates" + (f", {len(found.fixed)} idle ones held" if found.fixed else ""),
         ),
         ("box", found.box),
         ("units", UNITS),
@@ -46,10 +46,10 @@ def _back(found: BranchProof) -> Rows:
     if not all(part.cells for part in found.parts):
         return []
     rows: Rows = [("", "")]
-    if found.back is None:
+    if found.injective_box is None:
         rows.append(("way back", "undecided: motors for a pose are found, others in the box may give the same pose"))
     else:
-        (low, high), (least, most) = found.back, found.proved
+        (low, high), (least, most) = found.injective_box, found.proved
         whole = bool((low == least).all() and (high == most).all())
         rows.append(
             (
@@ -73,13 +73,13 @@ def _back(found: BranchProof) -> Rows:
 def _part(part: BranchPart) -> Rows:
     bounds = [
         f"{name} {low:.6g} to {high:.6g} (of {first:.6g} to {last:.6g})"
-        for name, low, high, first, last in zip(part.motors, *part.proved, *part.asked, strict=True)
+        for name, low, high, first, last in zip(part.motors, *part.proved, *part.requested_box, strict=True)
     ]
     rows: Rows = [("", ""), ("from", ", ".join(part.motors)), ("to", ", ".join(part.passive))]
     if not part.cells:
         return [*rows, ("branch", "undecided: no cell about the zero configuration could be proved")]
-    weakest = min(cell.weakest for cell in part.cells)
-    whole = part.share == 1.0
+    weakest = min(cell.smallest_singular_value for cell in part.cells)
+    whole = part.volume_fraction == 1.0
     but = " except for the redundant equations, which are bounded" if part.closed_to else ""
     rows += [
         (

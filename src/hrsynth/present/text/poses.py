@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...analysis.aspects.words import SAME, SEPARATED
-from ...analysis.aspects.words import UNDECIDED as UNDECIDED_PAIR
-from ...analysis.posture import CONSTRAINT, REGULAR, UNDECIDED
+from ...analysis.aspects.verdicts import SAME, SEPARATED
+from ...analysis.aspects.verdicts import UNDECIDED as UNDECIDED_PAIR
+from ...analysis.configuration_report import CONSTRAINT, REGULAR, UNDECIDED
 from ...constraints.condition import General
 from ...mechanism.pose import Pose
 from ...tolerances import NOISE, RANK_GAP
@@ -35,15 +35,15 @@ from .tables import (
 )
 
 if TYPE_CHECKING:
-    from ...analysis.aspects.atlas import Atlas, ModePair
-    from ...analysis.aspects.path import PathAnswer, SampledRoad
+    from ...analysis.aspects.aspects import AspectTable, ModePair
+    from ...analysis.aspects.path import PathAnswer, SampledRoute
     from ...analysis.check import Check, Checked, GridCheck, LoopCheck
+    from ...analysis.configuration_report import ConfigurationReport, SingularityDistances, SingularityReport
     from ...analysis.modes.assembly_mode import AssemblyMode
     from ...analysis.modes.modes import AssemblyModes
     from ...analysis.modes.near import NearMode
     from ...analysis.observed import ObservedRobot
-    from ...analysis.posture import Distances, Kinds, Posture
-    from ...analysis.singularity.singular import Singularity
+    from ...analysis.singularity.singularities import Singularity
 
 STATES = {
     REGULAR: "regular",
@@ -58,12 +58,12 @@ _SINCE = {"hidden": "the observed directions", "real": "the motors' coordinates"
 
 def check(found: Check) -> str:
     """What is observed, a block for each pose, then redundant constraints and the grid in numbers."""
-    seen = [f"{leg} ({', '.join(each)})" for leg, each in describe_watched(found.setting).items()]
-    generic, written = found.setting.mobility, found.as_written
+    seen = [f"{leg} ({', '.join(each)})" for leg, each in describe_watched(found.setup).items()]
+    generic, written = found.setup.mobility, found.as_written
     rows = [
-        head(found.setting)[0],
+        head(found.setup)[0],
         ("observed", seen),
-        *camera(found.setting),
+        *camera(found.setup),
         *known_row(
             "mobility",
             None
@@ -71,10 +71,10 @@ def check(found: Check) -> str:
             else f"{written.total} as the file is written, {generic.total} in normal form",
         ),
         ("lengths in", f"{found.length:.4g} m (the characteristic length), angles in radians"),
-        *dropped_limits(found.setting),
+        *dropped_limits(found.setup),
     ]
     for posture in found.postures:
-        rows += [*GAP, ("pose", str(posture.pose)), *_posture(posture, found.length, found.setting)]
+        rows += [*GAP, ("pose", str(posture.pose)), *_posture(posture, found.length, found.setup)]
     for each in found.unreached:
         rows += [*GAP, ("pose", each.pose), ("not reached", each.reason)]
     rows += [*GAP, _redundant_row(found)]
@@ -83,7 +83,7 @@ def check(found: Check) -> str:
         axes = zip(found.grid.grid.shape, found.grid.grid.names, strict=True)
         size = " × ".join(f"{count} {name}" for count, name in axes)
         fixed, free = str(found.grid.grid.fixed), ", ".join(_free(found.grid))
-        beyond = sum(bool(each.beyond) for each in found.grid.postures if each is not None)
+        beyond = sum(bool(each.beyond_limits) for each in found.grid.postures if each is not None)
         rows.append(
             (
                 "grid",
@@ -108,9 +108,9 @@ def _redundant_row(found: Checked) -> tuple[str, str | list[str]]:
 def loop_check(found: LoopCheck) -> str:
     """What the loops alone say, and what it takes to say more."""
     told = found.constraints
-    counted = f"{told.weakest:.2g} is the weakest singular value that counts, {told.dropped:.1g} the strongest that "
+    counted = f"{told.smallest_kept:.2g} is the weakest singular value that counts, {told.largest_dropped:.1g} "
     values = [f"{told.rank} independent of {told.rows}; as parts of the largest,"]
-    values += [f"{counted}does not (gap {told.gap:.1e}, needed {RANK_GAP:.0e})"]
+    values += [f"{counted}the strongest that does not (gap {told.gap:.1e}, needed {RANK_GAP:.0e})"]
     return listing(
         [
             ("robot", found.robot.name),
@@ -137,23 +137,23 @@ def _free(grid: GridCheck) -> Iterator[str]:
         yield name if not values else f"{name} = {low}" if low == high else f"{name} {low} to {high}"
 
 
-def _posture(posture: Posture, length: float, setting: ObservedRobot) -> Rows:
-    shown = "directions" if all(each.by_segment for each in setting.observed) else "observations"
+def _posture(posture: ConfigurationReport, length: float, setup: ObservedRobot) -> Rows:
+    shown = "directions" if all(each.by_segment for each in setup.observed) else "observations"
     mobility, far, dof = posture.mobility, posture.distances, posture.dof
-    whose = "bodies have" if setting.mechanism.formation else "platform has"
+    whose = "bodies have" if setup.mechanism.formation else "platform has"
     rows = [
-        *joint_rows(posture.coordinates, posture.beyond),
+        *joint_rows(posture.coordinates, posture.beyond_limits),
         *(
             (
                 "flat wrist",
                 f"the R that make {name} one S are {math.degrees(angle):.2g} degrees from where their "
                 "axes lie in a plane and turn it in two ways: not counted below",
             )
-            for name, angle in posture.flat_wrists.items()
+            for name, angle in posture.singular_spherical_joints.items()
         ),
         (
             "mobility",
-            f"{mobility.total}, of which {mobility.idle} idle; the {whose} "
+            f"{mobility.total}, of which {mobility.internal} idle; the {whose} "
             + ("one freedom" if dof == 1 else f"{dof} freedoms"),
         ),
         *_kinds(
@@ -171,7 +171,7 @@ def _posture(posture: Posture, length: float, setting: ObservedRobot) -> Rows:
             ("", f"singular values of Mᵀ {far.type2:.3g} to {1 / far.type1:.3g}, condition {far.condition:.3g}"),
             *(
                 [("", f"one degree of error in the {shown}{_describe_moved(far, length)}")]
-                if all(each.angular for each in setting.observed)
+                if all(each.angular for each in setup.observed)
                 else []
             ),
         ]
@@ -191,18 +191,21 @@ def _posture(posture: Posture, length: float, setting: ObservedRobot) -> Rows:
     return [*rows, ("loops' margin", f"{far.constraints:.3g} (weakest singular value, as part of the largest)")]
 
 
-def _kinds(name: str, what: str, kinds: Kinds, lost: str, *, whole: bool = True) -> Rows:
+def _kinds(name: str, what: str, kinds: SingularityReport, lost: str, *, whole: bool = True) -> Rows:
     state = STATES[kinds.state] if whole or kinds.state != REGULAR else "as many as at generic poses, not singular"
-    if kinds.classes is not None and kinds.classes.RO < 0:
-        state += f", but special: {-kinds.classes.RO} fewer are lost than at generic poses"
+    if kinds.singularity_indices is not None and kinds.singularity_indices.RO < 0:
+        state += f", but special: {-kinds.singularity_indices.RO} fewer are lost than at generic poses"
     title = f"{what}: {state} (smallest rank gap {kinds.gap:.1e}, needed {RANK_GAP:.0e})"
-    if kinds.classes is None:
+    if kinds.singularity_indices is None:
         return [(name, title)]
-    counts = "  ".join(f"{key} {value}" for key, value in kinds.classes.to_dict().items())
-    return [(name, [title, f"over the generic values: {counts}"]), *((lost, freedom.name) for freedom in kinds.lost)]
+    counts = "  ".join(f"{key} {value}" for key, value in kinds.singularity_indices.to_dict().items())
+    return [
+        (name, [title, f"over the generic values: {counts}"]),
+        *((lost, freedom.name) for freedom in kinds.unobserved),
+    ]
 
 
-def _describe_moved(far: Distances, length: float) -> str:
+def _describe_moved(far: SingularityDistances, length: float) -> str:
     """How far one degree of error moves the platform, where that is a small motion."""
     if (
         far.millimetres is None
@@ -223,8 +226,8 @@ def _small(value: float) -> str:
 def singularity(found: Singularity) -> str:
     """The condition in words and as an expression, what was checked, and singular poses."""
     condition, checked = found.condition, found.checked
-    name, seen = head(found.setting)
-    motors = dict.fromkeys(str(getattr(o, "joint", o.link)) for o in found.question.observations)
+    name, seen = head(found.setup)
+    motors = dict.fromkeys(str(getattr(o, "joint", o.link)) for o in found.observation_model.observations)
     rows: Rows = [
         name,
         ("motors", ", ".join(motors)) if found.real else seen,
@@ -273,7 +276,7 @@ def singularity(found: Singularity) -> str:
                 for line in (
                     str(each.pose),
                     f"  singular value {each.sigma:.1e}, a centimetre away up to {each.nearby:.1e}; lost: "
-                    + "; ".join(freedom.name for freedom in each.lost),
+                    + "; ".join(freedom.name for freedom in each.unobserved),
                 )
             ],
         )
@@ -284,15 +287,17 @@ def singularity(found: Singularity) -> str:
 def modes(found: AssemblyModes) -> str:
     """The pose whose measurements are held, the count with its proof, a block for each mode."""
     count = found.found
-    name, seen = head(found.setting)
+    name, seen = head(found.setup)
     if found.formation is not None:
         return _describe_formation(found, [name, seen, *formation(found.formation)])
     rows = [name, *([seen] if found.kind == "hidden" else []), ("held", f"{_describe_held(found)} at {found.pose}")]
-    if found.near:
-        rows += [("alike", f"{found.alike} (found, not proved, for errors up to {np.degrees(found.bound):.3g}°)")]
-    if count.continuum is None or count.complex is None:
+    if found.near_modes:
+        rows += [
+            ("alike", f"{found.alike} (found, not proved, for errors up to {np.degrees(found.measurement_bound):.3g}°)")
+        ]
+    if count.continuous_family is None or count.complex is None:
         rows += [("modes", f"{found.count}, {all_of(found)}"), ("proof", count.proof)]
-    for each in count.meant:
+    for each in count.snapped:
         legs = ", ".join(found.labels[k] for k in each.legs)
         rows.append(
             (
@@ -301,11 +306,11 @@ def modes(found: AssemblyModes) -> str:
                 "--as-written takes the numbers as they are)",
             )
         )
-    rows += [*known_row("special", count.degenerate), *dropped_limits(found.setting)]
-    for number, motion in enumerate(found.motions, 1):
+    rows += [*known_row("special", count.singular_solutions), *dropped_limits(found.setup)]
+    for number, motion in enumerate(found.self_motions, 1):
         place = "the pose itself" if motion.goal else str(found.pose_of(motion))
-        starts = f"{motion.met} start{'s' * (motion.met > 1)}"
-        met = f"; {starts} ended on it, or on one like it" if motion.met else ""
+        starts = f"{motion.hits} start{'s' * (motion.hits > 1)}"
+        met = f"; {starts} ended on it, or on one like it" if motion.hits else ""
         rows += [*GAP, (f"motion {number}", [f"through {place}, found, not proved: a self-motion {motion.words}{met}"])]
     for number, mode in enumerate(found.modes, 1):
         rows += [
@@ -315,7 +320,7 @@ def modes(found: AssemblyModes) -> str:
                 [
                     f"{mode.pose}" + ("   (the pose itself)" if mode.goal else ""),
                     proof_words(mode)
-                    if mode.fits is not None
+                    if mode.match_residual is not None
                     else f"{proof_words(mode)}, residual {mode.residual:.1e}",
                     *ahead(mode),
                     *at_mode(mode, found),
@@ -334,7 +339,7 @@ def modes(found: AssemblyModes) -> str:
                 ],
             ),
         ]
-    for number, mode in enumerate(found.near, 1):
+    for number, mode in enumerate(found.near_modes, 1):
         rows += [
             *GAP,
             (
@@ -352,9 +357,9 @@ def modes(found: AssemblyModes) -> str:
 
 def _describe_formation(found: AssemblyModes, rows: Rows) -> str:
     """The count with its proof, a block with the places of all bodies for each mode of a formation."""
-    if found.found.continuum is None:
+    if found.found.continuous_family is None:
         rows += [("modes", f"{found.count}, {all_of(found)}"), ("proof", found.found.proof)]
-    rows += known_row("special", found.found.degenerate)
+    rows += known_row("special", found.found.singular_solutions)
     for word, listed in (("mode", found.modes), ("antipodal", found.antipodal)):
         for number, mode in enumerate(listed, 1):
             told = [f"{body}: {Pose.of(X)}" for body, X in (mode.bodies or {}).items()]
@@ -367,7 +372,7 @@ def _describe_formation(found: AssemblyModes, rows: Rows) -> str:
                         *[f"not a mode: the opposite value of {', '.join(mode.opposite)}"] * bool(mode.opposite),
                         *told,
                         f"residual {mode.residual:.1e}",
-                        *[f"beyond the limits of {', '.join(mode.beyond)}"] * bool(mode.beyond),
+                        *[f"beyond the limits of {', '.join(mode.beyond_limits)}"] * bool(mode.beyond_limits),
                     ],
                 ),
             ]
@@ -375,7 +380,7 @@ def _describe_formation(found: AssemblyModes, rows: Rows) -> str:
 
 
 def _describe_held(found: AssemblyModes) -> str:
-    if found.kind == "hidden" and not all(o.by_segment for o in found.setting.observed):
+    if found.kind == "hidden" and not all(o.by_segment for o in found.setup.observed):
         return "what is observed"
     return _SINCE[found.kind]
 
@@ -397,7 +402,7 @@ def ahead(mode: AssemblyMode) -> list[str]:
 def all_of(found: AssemblyModes) -> str:
     """Whether the modes are all."""
     if found.found.complete:
-        fitting = sum(mode.fits is not None and not mode.goal for mode in found.modes)
+        fitting = sum(mode.match_residual is not None and not mode.goal for mode in found.modes)
         return f"proved to be all among {found.within}" + (
             f"; {fitting} of them fit{'s' * (fitting == 1)}, not proved" if fitting else ""
         )
@@ -414,10 +419,10 @@ def proof_words(mode: AssemblyMode) -> str:
     known = f"known {within}" if within else "known to no radius"
     if mode.proved:
         return f"{', '.join(mode.enclosed)}{' ' if mode.enclosed else ''}enclosed {within}"
-    if mode.fits is not None and mode.goal:
+    if mode.match_residual is not None and mode.goal:
         return f"a mode by construction, its place not proved, {known}"
-    if mode.fits is not None:
-        return f"fits all legs to {mode.fits:.1e}, which does not prove it; if it is a mode, {known}"
+    if mode.match_residual is not None:
+        return f"fits all legs to {mode.match_residual:.1e}, which does not prove it; if it is a mode, {known}"
     if mode.rounded:
         return f"not proved: enclosed {within} for the rounded geometry, not for the file's".replace("  ", " ")
     if mode.multiplicity > 1:
@@ -427,7 +432,7 @@ def proof_words(mode: AssemblyMode) -> str:
 
 def at_mode(mode: AssemblyMode, found: AssemblyModes) -> list[str]:
     """What the real robot does at a mode of a list."""
-    there, hidden = assembly(mode, found.setting.unlimited), found.kind == "hidden"
+    there, hidden = assembly(mode, found.setup.limits_ignored), found.kind == "hidden"
     there += [f"{name} {told}" for name, told in joint_rows(mode.coordinates)]
     if mode.type2_distance is None:
         seen = NO_MATRIX if hidden else "the motors can move there while the platform rests"
@@ -449,7 +454,7 @@ def assembly(mode: AssemblyMode, unlimited: Sequence[str] = ()) -> list[str]:
         case "beyond limits":
             return [
                 f"the real robot can be assembled there only beyond limits of joints: as found, of "
-                f"{', '.join(mode.beyond)}"
+                f"{', '.join(mode.beyond_limits)}"
             ]
         case "no":
             return [
@@ -457,8 +462,8 @@ def assembly(mode: AssemblyMode, unlimited: Sequence[str] = ()) -> list[str]:
                 *(f"leg {leg}: {miss}" for leg, miss in mode.misses),
             ]
     where = (
-        f"beyond the limits of {', '.join(mode.beyond)}"
-        if mode.beyond
+        f"beyond the limits of {', '.join(mode.beyond_limits)}"
+        if mode.beyond_limits
         else f"with {' and '.join(several(*each) for each in mode.left_open)} left open"
     )
     return [f"the real robot was found assembled there only {where}; whether it can be there otherwise is not known"]
@@ -468,7 +473,7 @@ def path(found: PathAnswer) -> str:
     """The verdict with its reason, the values at the two poses, and the path."""
     value = "expression" if found.signed else "smallest singular value"
     rows = [
-        *head(found.setting),
+        *head(found.setup),
         ("from", f"{found.start.pose}   ({value} {found.start.value:.4g})"),
         *joint_rows(found.start.coordinates),
         ("to", f"{found.goal.pose}   ({value} {found.goal.value:.4g})"),
@@ -477,9 +482,9 @@ def path(found: PathAnswer) -> str:
         ("verdict", [f"{found.verdict} ({'certified' if found.certified else 'not certified'})", found.reason]),
     ]
     if found.margin is not None:
-        where = "all along the path" if found.certified and found.ways else "at both poses"
+        where = "all along the path" if found.certified and found.segments else "at both poses"
         rows.append(("margin", f"|{value}| at least {found.margin:.3g} {where}, {found.boxes} intervals"))
-    if found.ways:
+    if found.segments:
         rows.append(("path" if found.certified else "best path", [str(pose) for pose in found.poses]))
     rows.append(
         ("crossings", [f"leg {leg} changes its working mode at {found.poses[place]}" for leg, place in found.crossings])
@@ -489,7 +494,7 @@ def path(found: PathAnswer) -> str:
     return listing([*rows, *known_row("not proved", found.not_proved if found.certified else None)])
 
 
-def road(found: SampledRoad, value: str) -> list[str]:
+def road(found: SampledRoute, value: str) -> list[str]:
     """What poses on the straight way say."""
     signs = {None: "", 0: ", the same sign at all of them"}.get(found.changes, f", {found.changes} changes of its sign")
     lines = [
@@ -497,18 +502,18 @@ def road(found: SampledRoad, value: str) -> list[str]:
     ]
     if found.reached < 1:
         lines.append(f"the robot was not followed further than {100 * found.reached:.0f} % of that path")
-    return lines + [f"{found.lost} is not in front of its camera all along it"] * (found.lost is not None)
+    return lines + [f"{found.out_of_view} is not in front of its camera all along it"] * (found.out_of_view is not None)
 
 
 _SIGNS = {SAME: "=", SEPARATED: "|", UNDECIDED_PAIR: "?"}
 
 
-def atlas(found: Atlas) -> str:
+def atlas(found: AspectTable) -> str:
     """The modes, how many aspects hold them, the table mode by mode, and what was asked of which pairs."""
     listed = found.listed
-    rows = [*head(listed.setting), ("held", f"{_describe_held(listed)} at {listed.pose}")]
-    if listed.found.continuum is not None:
-        return listing([*rows, *known_row("special", listed.found.degenerate)])
+    rows = [*head(listed.setup), ("held", f"{_describe_held(listed)} at {listed.pose}")]
+    if listed.found.continuous_family is not None:
+        return listing([*rows, *known_row("special", listed.found.singular_solutions)])
     rows += [
         ("modes", f"{listed.count}, {all_of(listed)}"),
         ("aspects", f"{found.aspects_met} of the hidden robot: {aspect_groups(found)}"),
@@ -531,16 +536,16 @@ def atlas(found: Atlas) -> str:
         for words, (first, *rest) in told.items()
     ]
     paths = [pair.answer for pair in found.pairs if pair.verdict == SAME and pair.answer is not None]
-    passed = ", ".join(dict.fromkeys(name for each in paths for name in each.unlimited))
+    passed = ", ".join(dict.fromkeys(name for each in paths for name in each.limits_ignored))
     return listing([*rows, *known_row("not proved", f"limits of joints {passed}" if passed else None)])
 
 
-def aspect_groups(found: Atlas) -> str:
+def aspect_groups(found: AspectTable) -> str:
     """The modes of each aspect."""
     return "; ".join(f"mode{'s' * (len(group) > 1)} {', '.join(map(str, group))}" for group in found.groups)
 
 
-def _cuspidal(found: Atlas) -> list[str]:
+def _cuspidal(found: AspectTable) -> list[str]:
     changes = found.changes
     if not changes:
         return ["not shown by the modes at this pose, which says nothing about other poses"]

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from ...analysis.observed import ObservedRobot
     from ...analysis.verdict import Verdict
     from ...codegen.export import ExportedCode
-    from ...kinematics.certificate import Certificate
+    from ...kinematics.equivalence import EquivalenceCheck
     from ...mechanism import Mechanism
     from ...mechanism.legs import LegDecomposition
     from ...rewrite.strategy import Step
@@ -68,12 +68,12 @@ def robot(found: Mechanism) -> str:
         *known_row("camera on", found.reference if found.reference != found.base else None),
     ]
     try:
-        anatomy = decompose(normal_form(found).mechanism)
-        rows.insert(0, ("robot", f"{found.name}   {anatomy.architecture()}"))
-        watched = {label: f"watched at {o.link}" for label, o in defaults_of(anatomy).items()}
+        decomposition = decompose(normal_form(found).mechanism)
+        rows.insert(0, ("robot", f"{found.name}   {decomposition.architecture()}"))
+        watched = {label: f"watched at {o.link}" for label, o in defaults_of(decomposition).items()}
         rows += [
             (f"leg {leg.label}", watched.get(leg.label, "no segment with a direction of its own"))
-            for leg in anatomy.legs
+            for leg in decomposition.legs
         ]
     except HrsynthError as error:
         rows[:0] = [("robot", [found.name, str(error)])]
@@ -82,16 +82,16 @@ def robot(found: Mechanism) -> str:
 
 def derivation(found: Derivation) -> str:
     """The hidden robot first, the proof next, the trace last."""
-    mobility, hidden, unchecked, observed = found.mobility, found.hidden_architecture, found.unchecked, found.setting
-    dof = [f"{found.dof} (mobility {mobility.total}, of which {mobility.idle} idle)"]
-    if observed.anatomy.point is not None:
+    mobility, hidden, unchecked, observed = found.mobility, found.hidden_architecture, found.unchecked, found.setup
+    dof = [f"{found.dof} (mobility {mobility.total}, of which {mobility.internal} idle)"]
+    if observed.decomposition.point is not None:
         dof.append("the platform is a point: its velocity is controlled, its rotation is idle")
     name, seen = head(observed)
     if found.verdict.formation is not None:
         dof[0] = f"{found.dof} of {len(found.verdict.formation.bodies)} bodies{dof[0].removeprefix(str(found.dof))}"
     rows: Rows = [
         name,
-        *_ends(observed.anatomy),
+        *_ends(observed.decomposition),
         ("dof", dof),
         seen,
         *camera(observed),
@@ -110,7 +110,7 @@ def derivation(found: Derivation) -> str:
         *lost_rows(found.verdict),
         ("at zero", [f"{each} (hrsynth check)" for each in at_zero(found.verdict)]),
         ("", [] if found.verdict.has_interaction_matrix else NO_MATRIX),
-        ("certificate", wrap_lines(certificate(found.certificate), LINE - NAMES)),
+        ("certificate", wrap_lines(certificate(found.equivalence), LINE - NAMES)),
         ("equal where", wrap_lines("; ".join(found.equal_where), LINE - NAMES) if hidden else []),
     ]
     if unchecked is not None:
@@ -128,9 +128,12 @@ def derivation(found: Derivation) -> str:
     return "\n".join([listing(rows), "", table(list(_attempts(found.steps)), ("rule", "leg", "taken", "angle", "why"))])
 
 
-def _ends(anatomy: LegDecomposition) -> Rows:
+def _ends(decomposition: LegDecomposition) -> Rows:
     """The link of an articulated platform on which each leg ends: with the same letters it makes another robot."""
-    links = {leg.attach: [each.label for each in anatomy.legs if each.attach == leg.attach] for leg in anatomy.legs}
+    links = {
+        leg.platform_link: [each.label for each in decomposition.legs if each.platform_link == leg.platform_link]
+        for leg in decomposition.legs
+    }
     return (
         []
         if len(links) < 2
@@ -140,7 +143,7 @@ def _ends(anatomy: LegDecomposition) -> Rows:
 
 def _attempts(steps: Sequence[Step]) -> Iterator[tuple[str, ...]]:
     """A line a step; of a rule's proposals that were taken back the first is shown, and how many more there were."""
-    for back, each in groupby(steps, lambda step: step.taken_back):
+    for back, each in groupby(steps, lambda step: step.discarded):
         run = list(each)
         starts = [i for i, step in enumerate(run) if step.rule == run[0].rule] if back else [0]
         for step in run[: starts[1]] if len(starts) > 1 else run:
@@ -158,7 +161,7 @@ def _attempts(steps: Sequence[Step]) -> Iterator[tuple[str, ...]]:
 
 def lost_rows(found: Verdict) -> Rows:
     """The freedoms that are not seen; at zero, where their names do not say where the platform is."""
-    names = [freedom.name for freedom in found.lost]
+    names = [freedom.name for freedom in found.unobserved]
     return [("lost" if any(ELSEWHERE in name for name in names) else "lost at zero", names)]
 
 
@@ -187,7 +190,7 @@ def formation(found: Formation | None) -> Rows:
 def _modes(observed: ObservedRobot) -> list[str]:
     """For which operation mode a verdict holds, where others were met."""
     found = observed.beside()
-    own = observed.everything.signature
+    own = observed.all_samples.signature
     return (
         [
             f"for the operation mode of the zero configuration: {own.dof} dof ({own.motion}), mobility {own.mobility}",
@@ -200,15 +203,15 @@ def _modes(observed: ObservedRobot) -> list[str]:
 
 def near(found: Verdict) -> str:
     """How far a verdict is from another one, where that is not far."""
-    counts = found.rank and found.counted < SURELY_SOMETHING
+    counts = found.rank and found.smallest_kept < SURELY_SOMETHING
     return (
         f"near another verdict: a motion that counts as {'seen' if counts else 'not seen'} has the singular value "
-        f"{found.counted if counts else found.dropped:.1e}, which counts above {RANK_CUTOFF:.0e} (rates of the "
-        "directions, characteristic lengths, radians)"
+        f"{found.smallest_kept if counts else found.largest_dropped:.1e}, "
+        f"which counts above {RANK_CUTOFF:.0e} (rates of the directions, characteristic lengths, radians)"
     )
 
 
-def certificate(found: Certificate) -> str:
+def certificate(found: EquivalenceCheck) -> str:
     """How closely the hidden robot agrees with the real one, and how closely it must."""
     return (
         f"{'passed' if found.passed else 'FAILED'} at {found.samples} configurations"
@@ -224,7 +227,7 @@ def verdict(found: Verdict) -> str:
         [
             ("legs", ", ".join(found.legs)),
             ("verdict", f"{found.verdict} (rank {found.rank} of {found.dof})"),
-            ("lost", [freedom.name for freedom in found.lost]),
+            ("lost", [freedom.name for freedom in found.unobserved]),
         ]
     )
 
@@ -253,7 +256,7 @@ def exact_cell(exact: ExactVerdict, rank: int) -> str:
 def unseen(found: Verdict) -> str:
     """What a set of legs does not see, in a cell of a table."""
     if found.formation is None:
-        return "; ".join(freedom.name for freedom in found.lost)
+        return "; ".join(freedom.name for freedom in found.unobserved)
     return f"{len(found.formation.trivial)} trivial" + "".join(f"; {flex.name}" for flex in found.formation.flexes)
 
 
@@ -264,11 +267,11 @@ def legs(found: Legs) -> str:
         for each, exact in zip(found.sets, found.exact, strict=True)
     ]
     lost = "lost" if any(ELSEWHERE in row[-1] for row in rows) else f"lost (at {found.where})"
-    if found.setting.mechanism.formation:
+    if found.setup.mechanism.formation:
         lost = f"not seen (at {found.where})"
     lines = [
         f"{found.robot}   {found.architecture}   {found.dof} dof",
-        f"platform: {found.setting.robot.platform_words}",
+        f"platform: {found.setup.robot.platform_words}",
         "",
         *wrap_lines(f"smallest sets of the best rank: {found.smallest}" if found.dof else NO_FREEDOM, more="  "),
         "",
@@ -276,7 +279,7 @@ def legs(found: Legs) -> str:
         "",
         *(
             line
-            for leg, seen in describe_watched(found.setting).items()
+            for leg, seen in describe_watched(found.setup).items()
             for line in wrap_lines(f"leg {leg}: {', '.join(seen)}", more="  ")
         ),
     ]
@@ -298,7 +301,7 @@ def legs(found: Legs) -> str:
             f"at {found.where}, a Type 2 singularity with these, fewer freedoms are seen: " + "  ".join(fewer),
             more="  ",
         )
-    lines += _modes(found.setting)
+    lines += _modes(found.setup)
     if not found.complete:
         lines.append(
             "not all sets are listed, there are too many: "
@@ -318,7 +321,7 @@ def describe_export(found: ExportedCode) -> str:
         robot_row(proof.robot),
         ("language", found.lang),
         ("motors", ", ".join(proof.motors)),
-        ("joints", f"{len(proof.passive)} passive, {len(proof.held)} idle (held)"),
+        ("joints", f"{len(proof.passive)} passive, {len(proof.fixed)} idle (held)"),
         ("directions", ", ".join(found.legs) or "none"),
         ("inverse", "in closed form" if found.closed else "by Newton's method, from nearby motors"),
         (
@@ -338,17 +341,20 @@ def describe_export(found: ExportedCode) -> str:
             (
                 "answers for",
                 [f"{name} {low:.6g} to {high:.6g}" for name, low, high in zip(part.motors, *part.proved, strict=True)]
-                + [f"and in all of {part.in_cells}, {100 * part.share:.4g} % of the box"],
+                + [f"and in all of {part.in_cells}, {100 * part.volume_fraction:.4g} % of the box"],
             )
         )
         rows += ends(part)
     rows += [("in no loop", [f"{name} {low:.6g} to {high:.6g}" for name, low, high in found.free])] * bool(found.free)
     rows += limits(proof)
-    if proof.back is not None:
+    if proof.injective_box is not None:
         rows.append(
             (
                 "way back",
-                [f"{name} {low:.6g} to {high:.6g}" for name, low, high in zip(proof.motors, *proof.back, strict=True)]
+                [
+                    f"{name} {low:.6g} to {high:.6g}"
+                    for name, low, high in zip(proof.motors, *proof.injective_box, strict=True)
+                ]
                 + ["no two motor settings in this box give the same platform pose on this branch, proved"],
             )
         )
@@ -364,8 +370,8 @@ def advice(found: Advice) -> str:
     """What is seen now, then the smallest sets of measurements that cure it, by kind."""
     now = found.now
     rows = [
-        *head(found.setting),
-        *camera(found.setting),
+        *head(found.setup),
+        *camera(found.setup),
         ("verdict", f"{now.verdict} (rank {now.rank} of {now.dof})"),
         *lost_rows(now),
     ]
@@ -386,8 +392,8 @@ def _missing(found: Advice) -> list[str]:
     best = found.sets[0].verdict
     gap = min(each.verdict.gap for each in found.sets)
     what = "one more measurement" if found.size == 1 else f"{found.size} more measurements"
-    if any(each.price != len(each.measurements) for each in found.sets):
-        what = f"further measurements at a price of {found.sets[0].price:g}"
+    if any(each.cost != len(each.measurements) for each in found.sets):
+        what = f"further measurements at a price of {found.sets[0].cost:g}"
     ways = "one way" if len(found.sets) == 1 else f"{len(found.sets)} ways"
     lines = [
         f"{best.verdict.capitalize()} (rank {best.rank} of {best.dof}) with {what}, {ways}, smallest rank gap "
@@ -427,16 +433,16 @@ def _singular(found: Advice) -> list[str]:
 
 def _options_that_ask(found: Advice) -> list[str]:
     """The options of other commands that ask with the first set that has such, and cures at zero too where one does."""
-    if not all(each.by_segment for each in found.setting.observed):
+    if not all(each.by_segment for each in found.setup.observed):
         return []
     for each in sorted(found.sets, key=lambda each: each.verdict.rank_at_zero is not None):
         see = [m.of if m.kind == "offered" else f"encoder:{m.of}" for m in each.measurements if m.kind != "leg"]
         if all(
             m.kind in ("leg", "offered")
-            or (m.kind == "encoder" and m.of in found.setting.robot.joints and m.axis is None)
+            or (m.kind == "encoder" and m.of in found.setup.robot.joints and m.axis is None)
             for m in each.measurements
         ):
-            legs = ",".join([*found.setting.labels, *(m.of for m in each.measurements if m.kind == "leg")])
+            legs = ",".join([*found.setup.labels, *(m.of for m in each.measurements if m.kind == "leg")])
             return ["for other commands: " + " ".join([f"--observe {legs}", *(f"--see {text}" for text in see)])]
     return []
 
@@ -469,8 +475,8 @@ def view(found: View) -> str:
         sliders.append(f"{slider.name}: {ends}, {len(slider.values)} closed configurations")
     return listing(
         [
-            robot_row(found.setting.robot, found.machines[0].words),
-            head(found.setting)[1],
+            robot_row(found.setup.robot, found.machines[0].words),
+            head(found.setup)[1],
             *(("hidden robot", machine.words) for machine in found.machines[1:]),
             ("sliders", sliders),
             ("other modes", ", ".join(outline.label for outline in found.mode_outlines) or []),

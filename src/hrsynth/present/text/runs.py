@@ -30,15 +30,15 @@ from .tables import (
 
 if TYPE_CHECKING:
     from ...analysis.accuracy.accuracy import Accuracy
-    from ...analysis.accuracy.cones import Blur
-    from ...analysis.accuracy.error_map import Spots
+    from ...analysis.accuracy.error_map import SpotChecks
+    from ...analysis.accuracy.measurement_bounds import MeasurementBounds
+    from ...analysis.accuracy.nonlinear_check import NonlinearCheck
     from ...analysis.accuracy.pose_errors import ErrorEllipsoid, PoseErrors
-    from ...analysis.accuracy.sampled import Sampled
     from ...analysis.accuracy.swept import SweptErrors
     from ...analysis.observed import ObservedRobot
     from ...selection.loop_ends import LoopEnds
     from ...selection.select import Candidate, ModeCount, Selection
-    from ...simulation.endings.basins import Basins
+    from ...simulation.equilibria.basins import Basins
     from ...simulation.result import Servo
 
 PARTS_FROM_LINEAR = 0.1
@@ -49,7 +49,7 @@ NEAR_SINGULARITY = 0.1
 
 def servo(found: Servo) -> str:
     """What was asked, where the run ended and why, what it passed, and how far noise kept it away."""
-    from ...simulation.track import CONSTRAINT, LIMIT, TYPE_1, TYPE_2
+    from ...simulation.crossings import CONSTRAINT, LIMIT, TYPE_1, TYPE_2
 
     passed = {
         TYPE_2: "crosses a Type 2 singularity of the hidden robot",
@@ -59,7 +59,7 @@ def servo(found: Servo) -> str:
     }
     run, track, off = found.run, found.track, found.from_goal
     rows = [
-        *head(found.setting),
+        *head(found.setup),
         ("from", str(found.start)),
         ("to", str(found.goal)),
         (
@@ -68,22 +68,22 @@ def servo(found: Servo) -> str:
             + ("" if found.depth == "exact" else f", depth: {found.depth}")
             + ("" if found.noise is None else f", noise {found.noise}"),
         ),
-        *dropped_limits(found.setting),
+        *dropped_limits(found.setup),
         *GAP,
-        ("ended", [f"{found.ended} after {run.times[-1]:.3g} s", found.ending.reason]),
+        ("ended", [f"{found.outcome} after {run.times[-1]:.3g} s", found.run_outcome.reason]),
         ("at", str(found.pose)),
         *joint_rows(found.coordinates),
     ]
-    if found.ended != "goal":
+    if found.outcome != "goal":
         rows.append(("", f"{1e3 * off[0]:.4g} mm and {_degrees(off[1])} degrees from the goal"))
-    if found.ending.modes is not None:
+    if found.run_outcome.modes is not None:
         rows.append(
             (
                 "modes",
                 [
                     *(
                         f"{i}: {mode.pose}" + ("   (the goal)" if mode.goal else "")
-                        for i, mode in enumerate(found.ending.modes.modes, 1)
+                        for i, mode in enumerate(found.run_outcome.modes.modes, 1)
                     ),
                     "numbered as modes --at the goal lists them",
                 ],
@@ -134,21 +134,21 @@ def servo(found: Servo) -> str:
 
 def basins(found: Basins) -> str:
     """The goal, the starts, where they end and how many each, and how that was found."""
-    from ...simulation.endings.basins import LETTERS, hindrances
+    from ...simulation.equilibria.basins import LETTERS, hindrances
 
     size = " × ".join(f"{count} {name}" for count, name in zip(found.grid.shape, found.grid.names, strict=True))
     rows = [
-        *head(found.setting),
-        *camera(found.setting),
+        *head(found.setup),
+        *camera(found.setup),
         ("to", str(found.goal)),
         ("starts", f"{found.starts:,} of {size}: {replace(found.grid, fixed=Pose())}"),
-        *known_row("held", describe_held(found.grid, found.setting, found.abreast)),
+        *known_row("held", describe_held(found.grid, found.setup, found.batched)),
         *GAP,
     ]
     lines = [
         [
             letter,
-            each.ending.name,
+            each.run_outcome.name,
             f"{each.count:,}",
             f"{100 * each.share:.3g} %",
             "" if each.pose is None else str(each.pose),
@@ -158,18 +158,18 @@ def basins(found: Basins) -> str:
     ]
     rows.append(("ends", table(lines, ("", "ended", "starts", "share", "at", "from, for example")).splitlines()))
     rows += [
-        ("why" if number == 0 else "", f"{letter}: {each.ending.reason}")
+        ("why" if number == 0 else "", f"{letter}: {each.run_outcome.reason}")
         for number, (letter, each) in enumerate(zip(LETTERS, found.ends, strict=False))
     ]
     notes = []
-    if not found.abreast:
-        notes.append(f"each start simulated separately: {', '.join(hindrances(found.setting))}")
+    if not found.batched:
+        notes.append(f"each start simulated separately: {', '.join(hindrances(found.setup))}")
     elif found.checked:
         notes.append(
             f"integrated together; of {found.checked} starts that were also simulated separately, "
             f"{found.agreed} ended at the same pose"
         )
-    if found.abreast and found.followed:
+    if found.batched and found.followed:
         notes.append(f"{found.followed} runs could not be followed this way and were simulated separately")
     if count := int(np.sum(found.damped)):
         notes.append(
@@ -191,18 +191,18 @@ def _degrees(angle: float) -> str:
 
 def accuracy(found: Accuracy) -> str:
     """The cones, the range of errors over a grid, a block for each single pose."""
-    name, _ = head(found.setting)
+    name, _ = head(found.setup)
     rows = [
         name,
         (
             "observed",
-            ", ".join(f"{label_of(o)} {found.blur.words(i, o)}" for i, o in enumerate(found.setting.observed)),
+            ", ".join(f"{label_of(o)} {found.bounds.words(i, o)}" for i, o in enumerate(found.setup.observed)),
         ),
-        *camera(found.setting),
-        ("errors", f"largest over all errors {found.blur.inside}, to first order"),
-        *dropped_limits(found.setting),
+        *camera(found.setup),
+        ("errors", f"largest over all errors {found.bounds.inside}, to first order"),
+        *dropped_limits(found.setup),
     ]
-    length = found.setting.everything.twin.length
+    length = found.setup.all_samples.model.length
     if found.field is not None:
         rows += [*GAP, *field_rows(found), *_limits_left(found)]
     if found.swept is not None:
@@ -211,7 +211,7 @@ def accuracy(found: Accuracy) -> str:
         rows += [
             *GAP,
             ("pose", str(errors.pose)),
-            *joint_rows(errors.coordinates, errors.beyond),
+            *joint_rows(errors.coordinates, errors.beyond_limits),
             *_extent("position", errors.position, 1e3, "mm", length),
             *_extent("orientation", errors.orientation, 180 / np.pi, "degrees"),
             *([] if true is None else _samples(errors, true)),
@@ -221,13 +221,13 @@ def accuracy(found: Accuracy) -> str:
 
 def _limits_left(found: Accuracy) -> Rows:
     """Whose limits a grid passes over."""
-    limited = ", ".join(found.setting.mechanism.stops)
+    limited = ", ".join(found.setup.mechanism.stops)
     return [("limits", f"those of {limited} are not checked")] if limited else []
 
 
 def field_rows(found: Accuracy) -> Rows:
     """What a grid holds: its size, what is reached of it, the range of the errors, how they were checked."""
-    field, length = found.field, found.setting.everything.twin.length
+    field, length = found.field, found.setup.all_samples.model.length
     assert field is not None
     ranges = [
         ErrorRange.of(field.position, LARGEST_FIRST_ORDER * length),
@@ -257,10 +257,10 @@ def _swept_rows(found: Accuracy, swept: SweptErrors) -> Rows:
     )
 
 
-def describe_held(grid: Grid, setting: ObservedRobot, as_at_home: bool) -> str | None:
+def describe_held(grid: Grid, setup: ObservedRobot, as_at_home: bool) -> str | None:
     """What a grid holds: the whole pose but for what varies, where free parts stay as they are at the zero
     configuration (``as_at_home``), else what was given and which parts are free."""
-    motion, typed = setting.motion, str(grid.fixed)
+    motion, typed = setup.motion, str(grid.fixed)
     if not as_at_home:
         free = ", ".join(motion.free({*grid.names, *grid.fixed.given}))
         return (
@@ -268,7 +268,7 @@ def describe_held(grid: Grid, setting: ObservedRobot, as_at_home: bool) -> str |
             if not free
             else (f"{typed or 'nothing'}; free, at each pose nearest to the zero configuration: {free}")
         )
-    ends, _ = poses_over(motion, grid, setting.robot.name, grid.places_at(np.array([0, grid.size - 1])))
+    ends, _ = poses_over(motion, grid, setup.robot.name, grid.places_at(np.array([0, grid.size - 1])))
     first, last = (dict(part.split("=") for part in str(motion.pose(X)).split(",")) for X in ends)
     given = dict(part.split("=") for part in typed.split(",") if part)
     turned = {"phi", "rpy"} & {*grid.names, *given}
@@ -284,7 +284,7 @@ def describe_held(grid: Grid, setting: ObservedRobot, as_at_home: bool) -> str |
 
 
 def _grid_rows(
-    found: Accuracy, grid: Grid, reached: str, position: str, orientation: str, spots: Spots | None, gap: float
+    found: Accuracy, grid: Grid, reached: str, position: str, orientation: str, spots: SpotChecks | None, gap: float
 ) -> Rows:
     size = " × ".join(f"{count} {name}" for count, name in zip(grid.shape, grid.names, strict=True))
     ranges = ", ".join(
@@ -292,7 +292,7 @@ def _grid_rows(
     )
     rows = [
         ("poses", f"{size}: {ranges}"),
-        *known_row("held", describe_held(grid, found.setting, spots is not None)),
+        *known_row("held", describe_held(grid, found.setup, spots is not None)),
         ("reached", reached),
         ("position", position),
         ("orientation", orientation),
@@ -301,10 +301,10 @@ def _grid_rows(
         rows.append(
             ("checked", f"against Pinocchio at {spots.count} random poses, largest difference {spots.difference:.1e}")
         )
-    return [*rows, *(("", line) for line in _bounds(found.blur, "nowhere", gap))]
+    return [*rows, *(("", line) for line in _bounds(found.bounds, "nowhere", gap))]
 
 
-def _bounds(blur: Blur, where: str, gap: float) -> list[str]:
+def _bounds(blur: MeasurementBounds, where: str, gap: float) -> list[str]:
     """How much too large errors may be, if they are bounds."""
     return (
         [f"three {blur.each}s or more: upper bounds, {where} more than {_percent(gap)} % too large"]
@@ -321,14 +321,18 @@ def _range(found: ErrorRange, errors: Array | None, unit: float, word: str) -> s
         text.append(f"{unit * found.least:.4g} to {unit * found.largest:.4g} {word}")
         if errors is not None:
             text[0] += f", median {unit * np.median(errors[errors <= found.largest]):.4g}"
-    text += [f"{NOT_BOUNDED} at {found.loose} poses"] * (found.loose > 0)
+    text += [f"{NOT_BOUNDED} at {found.slack} poses"] * (found.slack > 0)
     return "; ".join([*text, *[f"infinite at {found.infinite} poses, where a freedom is lost"] * (found.infinite > 0)])
 
 
-def _samples(errors: PoseErrors, true: Sampled) -> Rows:
-    met = f"smallest singular value of Mᵀ met {true.weakest:.3g}" if np.isfinite(true.weakest) else "Mᵀ is not met"
+def _samples(errors: PoseErrors, true: NonlinearCheck) -> Rows:
+    met = (
+        f"smallest singular value of Mᵀ met {true.smallest_singular_value:.3g}"
+        if np.isfinite(true.smallest_singular_value)
+        else "Mᵀ is not met"
+    )
     if np.isfinite(true.usual):
-        near = not true.weakest >= max(NEAR_SINGULARITY * true.usual, DAMPED)
+        near = not true.smallest_singular_value >= max(NEAR_SINGULARITY * true.usual, DAMPED)
         met += f", at the pose {true.usual:.3g}" + (": a singularity is near" if near else "")
     else:
         met += "; at the pose there is no Mᵀ: observed links move while the platform rests"
@@ -389,15 +393,15 @@ def _vector(vector: Array) -> str:
 
 def selection(found: Selection) -> str:
     """The displacement, the table, the reasons."""
-    observed, sight, blur = found.setting.observed, found.sight is not None, found.blur
-    length = found.setting.everything.twin.length
+    observed, sight, blur = found.setup.observed, found.visible_from is not None, found.bounds
+    length = found.setup.all_samples.model.length
     cones = dict.fromkeys(f"{np.degrees(cone):.4g}°" for cone in blur.cones)
     angle = (
         next(iter(cones))
         if len(cones) == 1
         else ", ".join(f"{o.leg} {np.degrees(cone):.4g}°" for o, cone in zip(observed, blur.cones, strict=True))
     )
-    name, _ = head(found.setting)
+    name, _ = head(found.setup)
     wrong = (
         ("cones", f"{angle} about each direction")
         if blur.noise is None
@@ -408,13 +412,13 @@ def selection(found: Selection) -> str:
         ("from", str(found.start)),
         ("to", str(found.goal)),
         wrong,
-        *dropped_limits(found.setting),
+        *dropped_limits(found.setup),
         ("sets", f"{len(found.candidates)}, kept: {len(found.kept)}"),
     ]
     if found.unexamined:
         rows.append(("", f"not examined: {len(found.unexamined)} ({found.left})"))
-    if found.sight is not None:
-        rows.append(("camera", f"on {found.sight.reference}"))
+    if found.visible_from is not None:
+        rows.append(("camera", f"on {found.visible_from.reference}"))
     blocks = [listing(rows)]
     if found.kept:
         heads = [
@@ -436,7 +440,11 @@ def selection(found: Selection) -> str:
             "that the robot was found to reach; – not computed. Best first: by others, by certified\n"
             "(alike within a power of two), by mm"
         )
-        radii = [each.ends.radius for each in found.kept if each.ends is not None and each.ends.radius is not None]
+        radii = [
+            each.equilibria.radius
+            for each in found.kept
+            if each.equilibria is not None and each.equilibria.radius is not None
+        ]
         points = dict.fromkeys(each.measured for each in radii if each.measured)
         blocks += [f"distances from the goal: {each}" for each in points]
         if found.fewer is not None:
@@ -470,7 +478,7 @@ def _row(each: Candidate, sight: bool, length: float) -> list[str]:
     position, orientation = errors.position.largest, errors.orientation.largest
     return [
         ", ".join(each.legs),
-        *_ends(each.ends),
+        *_ends(each.equilibria),
         f"{1e3 * position:.4g}" if is_bounded(position, length) else "not bounded",
         f"{np.degrees(orientation):.4g}" if is_bounded(orientation) else "not bounded",
         f"{_modes(each.start_modes)} / {_modes(each.goal_modes)}",

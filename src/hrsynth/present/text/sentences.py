@@ -35,7 +35,7 @@ def which(verdict: Verdict) -> str:
         return (
             "Watching the legs does not help: their directions do not change with the platform wherever it was tried."
         )
-    lost = len(verdict.lost)
+    lost = len(verdict.unobserved)
     return (
         f"Watching legs is not enough: even with all of them {lost} of {verdict.dof} freedoms "
         f"stay{'s' * (lost == 1)} unseen wherever it was tried: {verdict.named}."
@@ -54,16 +54,16 @@ def blind(verdict: Verdict) -> list[str]:
     ]
 
 
-def describe_seen(verdict: Verdict, labels: Sequence[str], setting: ObservedRobot) -> str:
+def describe_seen(verdict: Verdict, labels: Sequence[str], setup: ObservedRobot) -> str:
     """How many freedoms are seen, and what is not."""
     if (bodies := verdict.formation) is not None:
         rest = "".join(f"; {each.name}" for each in bodies.flexes) or "; nothing else"
         return (
-            f"Watching {_joined(labels, things(setting))} shows {verdict.rank} of the bodies' {verdict.dof} freedoms. "
+            f"Watching {_joined(labels, things(setup))} shows {verdict.rank} of the bodies' {verdict.dof} freedoms. "
             f"Not seen: {', '.join(bodies.trivial) or 'no trivial motion'}{rest}."
         )
-    unseen = verdict.named if verdict.lost else ""
-    return shows(labels, things(setting), verdict.rank, verdict.dof, unseen)
+    unseen = verdict.named if verdict.unobserved else ""
+    return shows(labels, things(setup), verdict.rank, verdict.dof, unseen)
 
 
 def shows(labels: Sequence[str], what: str, rank: int, dof: int, unseen: str = "") -> str:
@@ -105,7 +105,7 @@ def usual_error(found: Accuracy) -> list[str]:
         for values, unit in ((1e3 * field.position, "mm"), (np.degrees(field.orientation), "degrees"))
         if _median(values) > 0
     ]
-    what = "Directions" if found.blur.noise is None else "Measurements"
+    what = "Directions" if found.bounds.noise is None else "Measurements"
     words = (
         f"{what} wrong by {noise_words(found)} put the platform off by up to {' and '.join(said)} "
         "(median over the map below, to first order)."
@@ -115,26 +115,26 @@ def usual_error(found: Accuracy) -> list[str]:
 
 def noise_words(found: Accuracy) -> str:
     """How wrong measurements may be, for the map."""
-    return (CONE_TEXT if found.blur.noise is None else str(found.blur.noise)).replace("deg", "°")
+    return (CONE_TEXT if found.bounds.noise is None else str(found.bounds.noise)).replace("deg", "°")
 
 
 def alike(found: AssemblyModes) -> str | None:
     """How many poses look the same at home, None where these are a continuum or none was found."""
-    if found.found.continuum is not None or not found.modes:
+    if found.found.continuous_family is not None or not found.modes:
         return None
     far = "; a run that starts far away may end at another than its goal."
-    if found.near:
+    if found.near_modes:
         return f"At home {found.alike}{far}"
     count = len(found.modes)
-    words = f"At home {count} pose{'s have' if count > 1 else ' has'} the same {describe_held(found.setting)}"
+    words = f"At home {count} pose{'s have' if count > 1 else ' has'} the same {describe_held(found.setup)}"
     return f"{words} ({all_of(found)}){far if count > 1 else '.'}"
 
 
 def elsewhere(found: AssemblyModes) -> str:
     """Where else the loop may stop: the other assembly modes, as they were listed."""
-    if found.found.continuum is not None or found.motions:
+    if found.found.continuous_family is not None or found.self_motions:
         return "The loop may stop anywhere on a whole curve of poses at which the legs look the same."
-    others: list[AssemblyMode] = [*(mode for mode in found.modes if not mode.goal), *found.near]
+    others: list[AssemblyMode] = [*(mode for mode in found.modes if not mode.goal), *found.near_modes]
     return _others(found, len(others), [mode for mode in others if mode.reachable is not False])
 
 
@@ -151,23 +151,23 @@ def _others(found: AssemblyModes, count: int, met: list[AssemblyMode]) -> str:
                 else ("No other pose was found at which the legs look the same")
             )
         return f"{words}." if known else f"{words}; there may be others that were not found."
-    away = sorted(distance_from(found.setting.motion, found.goal, mode) for mode in met)
+    away = sorted(distance_from(found.setup.motion, found.goal, mode) for mode in met)
     near, turn = away[0]
     far = f"{_length(near)} away" if near > SAME_RELATION else f"turned by {np.degrees(turn):.2g}°"
     where = f"one other pose, {far}" if len(met) == 1 else f"{_number(len(met))} other poses, the nearest {far}"
-    if found.near:
-        where += f" (directions that differ by no more than {degrees(found.near[-1].angle)})"
+    if found.near_modes:
+        where += f" (directions that differ by no more than {degrees(found.near_modes[-1].angle)})"
     return f"The loop may stop at {where}{'' if known else ', and perhaps at others that were not found'}."
 
 
-def things(setting: ObservedRobot) -> str:
+def things(setup: ObservedRobot) -> str:
     """What sets are sets of."""
-    return "legs" if all(o.by_segment for o in setting.observed) else "observations"
+    return "legs" if all(o.by_segment for o in setup.observed) else "observations"
 
 
-def describe_held(setting: ObservedRobot) -> str:
+def describe_held(setup: ObservedRobot) -> str:
     """What assembly modes have in common."""
-    return "observed directions" if things(setting) == "legs" else "measurements"
+    return "observed directions" if things(setup) == "legs" else "measurements"
 
 
 def _joined(labels: Sequence[str], what: str) -> str:

@@ -43,17 +43,17 @@ def table(rows: Sequence[Sequence[str]], heads: Sequence[str]) -> str:
     """Columns set apart by two spaces, a rule under the heads; the last column is not padded, and wrapped where the
     lines would be too long."""
     before = sum(max(width(row[i]) for row in (heads, *rows)) + 2 for i in range(len(heads) - 1))
-    everything = [list(heads)]
+    all_samples = [list(heads)]
     for *cells, last in rows:
         first, *more = wrap_lines(last, max(LINE - before, LEAST))
-        everything += [[*cells, first], *([*[""] * len(cells), line] for line in more)]
-    columns = [max(width(row[i]) for row in everything) for i in range(len(heads))]
+        all_samples += [[*cells, first], *([*[""] * len(cells), line] for line in more)]
+    columns = [max(width(row[i]) for row in all_samples) for i in range(len(heads))]
 
     def line(row: Sequence[str]) -> str:
         cells = [cell + " " * (columns[i] - width(cell)) for i, cell in enumerate(row)]
         return "  ".join(cells).rstrip()
 
-    return "\n".join([line(heads), "  ".join("-" * size for size in columns), *map(line, everything[1:])])
+    return "\n".join([line(heads), "  ".join("-" * size for size in columns), *map(line, all_samples[1:])])
 
 
 def wrap_lines(text: str, columns: int = LINE, more: str = "") -> list[str]:
@@ -107,9 +107,9 @@ def write_value(value: float | tuple[float, ...]) -> str:
     return "/".join(f"{round(x, 9) + 0.0:.6g}" for x in (value if isinstance(value, tuple) else (value,)))
 
 
-def dropped_limits(setting: ObservedRobot) -> Rows:
+def dropped_limits(setup: ObservedRobot) -> Rows:
     """The joints whose limits are not looked at."""
-    joints = ", ".join(setting.unlimited)
+    joints = ", ".join(setup.limits_ignored)
     return [("limits", f"those of {joints} are not looked at: they are parts of other joints")] if joints else []
 
 
@@ -121,7 +121,10 @@ def robot_row(robot: Mechanism, words: str = "") -> tuple[str, list[str]]:
 def head(found: ObservedRobot) -> Rows:
     """The robot and what is observed of it."""
     seen = ", ".join(label_of(each).replace(" ", "\u00a0") for each in found.observed)
-    return [robot_row(found.robot, str(found.anatomy.architecture())), ("observed", wrap_lines(seen, LINE - NAMES))]
+    return [
+        robot_row(found.robot, str(found.decomposition.architecture())),
+        ("observed", wrap_lines(seen, LINE - NAMES)),
+    ]
 
 
 def label_of(observation: Observation) -> str:
@@ -147,7 +150,7 @@ def describe_watched(found: ObservedRobot) -> dict[str, list[str]]:
     from ...analysis.freedoms import point_text
 
     told: dict[str, list[str]] = {}
-    for o, why in found.watched():
+    for o, why in found.observed_axes():
         said = o.to_dict()
         places = {"at": said["at"], "along": said["axis"]}
         where = "".join(f" {word} {point_text(at)}" for word, at in places.items() if at is not None)

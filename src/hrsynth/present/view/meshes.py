@@ -18,26 +18,26 @@ MOST_TRIANGLES = 200_000
 """Triangles of all meshes together beyond which they are left out: the page holds them as text."""
 
 
-def meshes(setting: ObservedRobot, within: Path | None = None) -> tuple[tuple[Shape, ...], tuple[str, ...]]:
+def meshes(setup: ObservedRobot, within: Path | None = None) -> tuple[tuple[Shape, ...], tuple[str, ...]]:
     """The shapes of the file's visuals, on the links of the normal form, and notes where meshes are missing; with
     ``within`` no files are read that do not lie in that folder."""
-    robot, mechanism = setting.robot, setting.mechanism
+    robot, mechanism = setup.robot, setup.mechanism
     found, missing, between, count = [], [], [], 0
     shown = [
         solid
         for name, link in robot.links.items()
-        if setting.normal.into.get(name) in mechanism.links
+        if setup.normal.into.get(name) in mechanism.links
         for solid in content_of(link, robot).solids
         if solid.role == "visual"
     ]
     files = triangles([solid.file for solid in shown if solid.file is not None], robot.file, within)
     for name, link in robot.links.items():
-        into = setting.normal.into.get(name)
+        into = setup.normal.into.get(name)
         if into is None or into not in mechanism.links:
             if any(solid.role == "visual" for solid in content_of(link, robot).solids):
                 between.append(name)
             continue
-        role = BASE if into == mechanism.base else PLATFORM if into in setting.anatomy.platform else LEG
+        role = BASE if into == mechanism.base else PLATFORM if into in setup.decomposition.platform else LEG
         for solid in content_of(link, robot).solids:
             if solid.role != "visual":
                 continue

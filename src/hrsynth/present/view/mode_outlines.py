@@ -51,21 +51,21 @@ class ModeOutline(Value):
         }
 
 
-def mode_outlines(setting: ObservedRobot) -> tuple[tuple[ModeOutline, ...], tuple[str, ...]]:
+def mode_outlines(setup: ObservedRobot) -> tuple[tuple[ModeOutline, ...], tuple[str, ...]]:
     """All modes but the zero configuration's pose, and why there are none or not all."""
     try:
-        found = modes(setting)
+        found = modes(setup)
     except HrsynthError as error:
         return (), (f"assembly modes are not shown: {error}",)
-    if found.found.continuum is not None:
-        return (), (f"assembly modes are not shown: {found.found.degenerate}",)
+    if found.found.continuous_family is not None:
+        return (), (f"assembly modes are not shown: {found.found.singular_solutions}",)
     notes = () if found.found.complete else ("perhaps not all assembly modes are shown",)
     listed = [(str(number), mode) for number, mode in enumerate(found.modes, 1) if not mode.goal]
-    listed += [(f"near {number}", mode) for number, mode in enumerate(found.near, 1)]
-    return tuple(outline(setting, *each) for each in listed), notes
+    listed += [(f"near {number}", mode) for number, mode in enumerate(found.near_modes, 1)]
+    return tuple(outline(setup, *each) for each in listed), notes
 
 
-def outline(setting: ObservedRobot, label: str, mode: AssemblyMode) -> ModeOutline:
+def outline(setup: ObservedRobot, label: str, mode: AssemblyMode) -> ModeOutline:
     """An assembly mode with its ``label``."""
 
     def where(link: str) -> Array | None:
@@ -75,7 +75,7 @@ def outline(setting: ObservedRobot, label: str, mode: AssemblyMode) -> ModeOutli
             X = mode.bodies[link]
         else:
             return None
-        return place(X @ inverse(setting.mechanism.links[link].pose))
+        return place(X @ inverse(setup.mechanism.links[link].pose))
 
-    places = tuple(where(link) for link in setting.mechanism.links)
+    places = tuple(where(link) for link in setup.mechanism.links)
     return ModeOutline(label, mode.pose, mode.reachable, mode.assembly, places)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.accuracy.cones import Blur
+from ...analysis.accuracy.measurement_bounds import MeasurementBounds
 from ...analysis.accuracy.pose_errors import largest_by_ascent
 from ...analysis.observed import ObservedRobot
 from ...kinematics.configuration import ClosedConfiguration
@@ -26,9 +26,9 @@ SIGNS = {"mm": " mm", "deg": "°"}
 LOST = "a freedom is not seen: the error has no bound"
 
 
-def unit_of(setting: ObservedRobot) -> str:
+def unit_of(setup: ObservedRobot) -> str:
     """In which unit a platform's error is shown: degrees where it only turns."""
-    return "mm" if setting.motion.translations.shape[1] else "deg"
+    return "mm" if setup.motion.translations.shape[1] else "deg"
 
 
 def step_of(value: float | None, unit: str) -> int:
@@ -36,17 +36,19 @@ def step_of(value: float | None, unit: str) -> int:
     return len(NAMES) - 1 if value is None else int(np.searchsorted(STEPS[unit], value, side="right"))
 
 
-def error(setting: ObservedRobot, at: ClosedConfiguration) -> dict[str, Any]:
+def error(setup: ObservedRobot, at: ClosedConfiguration) -> dict[str, Any]:
     """What the platform can be wrong by at a configuration, found by an ascent (:func:`.largest_by_ascent`); None where
     there is no bound, or none to first order."""
-    unit = unit_of(setting)
-    if not all(isinstance(each, Direction) for each in setting.observed):
+    unit = unit_of(setup)
+    if not all(isinstance(each, Direction) for each in setup.observed):
         return {**nothing(unit, "not given: what is watched is not a direction"), "step": None}
-    metres, radians = largest_by_ascent(at, setting.samples.question, Blur(np.full(len(setting.observed), CONE)))
-    if np.isfinite([metres, radians]).all() and not (is_bounded(metres, at.twin.length) and is_bounded(radians)):
+    metres, radians = largest_by_ascent(
+        at, setup.samples.observation_model, MeasurementBounds(np.full(len(setup.observed), CONE))
+    )
+    if np.isfinite([metres, radians]).all() and not (is_bounded(metres, at.model.length) and is_bounded(radians)):
         return nothing(unit, NOT_BOUNDED)
     return describe_error(
-        finite(1e3 * metres), finite(math.degrees(radians)), unit, bool(setting.motion.rotations.shape[1])
+        finite(1e3 * metres), finite(math.degrees(radians)), unit, bool(setup.motion.rotations.shape[1])
     )
 
 

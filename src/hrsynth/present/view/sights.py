@@ -12,9 +12,9 @@ import numpy as np
 from ...analysis.observed import ObservedRobot
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
+from ...mechanism.cameras import CameraObservation, NamedCamera
 from ...mechanism.observation import Drawn
 from ...mechanism.observations.direction import Direction
-from ...mechanism.sights import CameraObservation, NamedCamera
 from ...results import Value
 from .shapes import PAGE_DIGITS
 
@@ -45,12 +45,12 @@ class ShownSight(Value):
         return {"name": self.name, "camera": self.camera, **rounded}
 
 
-def eyes(setting: ObservedRobot) -> list[NamedCamera]:
+def eyes(setup: ObservedRobot) -> list[NamedCamera]:
     """The cameras by which something is seen; where none is named, the reference link's frame."""
     found: dict[str, NamedCamera] = {}
-    for seen in setting.observed:
+    for seen in setup.observed:
         if isinstance(seen, CameraObservation):
-            eye = seen.camera or NamedCamera(setting.mechanism.reference, seen.seen_from or setting.mechanism.reference)
+            eye = seen.camera or NamedCamera(setup.mechanism.reference, seen.seen_from or setup.mechanism.reference)
             found.setdefault(eye.name, eye)
     return list(found.values())
 
@@ -72,16 +72,16 @@ def frames(cameras: Sequence[NamedCamera], home: Sequence[ShownSight]) -> list[A
     return found
 
 
-def shown_sights(setting: ObservedRobot, at: ClosedConfiguration) -> tuple[ShownSight, ...]:
+def shown_sights(setup: ObservedRobot, at: ClosedConfiguration) -> tuple[ShownSight, ...]:
     """All that is observed but directions, which are arrows on their links, and the cameras."""
-    found, every, length = [], eyes(setting), setting.mechanism.length
-    for seen in setting.observed:
+    found, every, length = [], eyes(setup), setup.mechanism.length
+    for seen in setup.observed:
         if isinstance(seen, Direction):
             continue
-        poses = at.pose(seen.seen_from or setting.mechanism.reference), at.pose(seen.link)
+        poses = at.pose(seen.seen_from or setup.mechanism.reference), at.pose(seen.link)
         eye = None
         if isinstance(seen, CameraObservation):
-            name = seen.camera.name if seen.camera else setting.mechanism.reference
+            name = seen.camera.name if seen.camera else setup.mechanism.reference
             eye = next(i for i, each in enumerate(every) if each.name == name)
         found.append(
             ShownSight(seen.leg, seen.draw(*poses, REACH * length), eye, tuple(seen.image(*poses, REACH * length)))

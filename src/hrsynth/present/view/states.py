@@ -12,16 +12,16 @@ from typing import Any
 
 import numpy as np
 
+from ...analysis.configuration_report import ConfigurationAnalysis
 from ...analysis.observed import ObservedRobot
-from ...analysis.posture import ConfigurationAnalysis
 from ...budgets import APPROACH, FOLLOWING
 from ...geometry.vectors import Array, inverse
 from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.continuation import approach, track
 from ...kinematics.coordinates import Coordinates
 from ...kinematics.pinocchio_model import PinocchioModel
-from ...kinematics.platform_motion import Goal
-from ...kinematics.steps import approach, track
-from ...kinematics.tasks import Target, solve, system
+from ...kinematics.platform_motion import PoseTask
+from ...kinematics.tasks import PoseAndValuesTask, solve, system
 from ...mechanism import Mechanism
 from ...records import Number, Recorded, Shown
 from ...results import Value
@@ -98,32 +98,32 @@ class Posed(Value):
 class Mover(Value):
     """The real robot with its platform's coordinates, and the twin of the hidden robot that follows it."""
 
-    setting: ObservedRobot
+    setup: ObservedRobot
     coordinates: Coordinates
     examiner: ConfigurationAnalysis
     hidden: PinocchioModel | None = None
 
     @classmethod
-    def of(cls, setting: ObservedRobot, hidden: Mechanism | None) -> Mover:
+    def of(cls, setup: ObservedRobot, hidden: Mechanism | None) -> Mover:
         """At the zero configuration."""
-        start = setting.everything.start
-        twin = None if hidden is None else PinocchioModel(hidden, start.twin.length)
-        coordinates = Coordinates.of(start, setting.everything.question, setting.motion)
-        return cls(setting, coordinates, ConfigurationAnalysis.of(setting), twin)
+        start = setup.all_samples.start
+        model = None if hidden is None else PinocchioModel(hidden, start.model.length)
+        coordinates = Coordinates.of(start, setup.all_samples.observation_model, setup.motion)
+        return cls(setup, coordinates, ConfigurationAnalysis.of(setup), model)
 
     @property
     def home(self) -> Posed:
         """The zero configuration."""
-        return Posed(self.setting.everything.start, None if self.hidden is None else self.hidden.q0)
+        return Posed(self.setup.all_samples.start, None if self.hidden is None else self.hidden.q0)
 
     def state(self, at: Posed) -> ViewState:
         """What the page shows of a configuration."""
-        sights = shown_sights(self.setting, at.real)
+        sights = shown_sights(self.setup, at.real)
         return ViewState(self.places(at), self.examiner.classify(at.real).distances.type2, sights=sights)
 
     def places(self, at: Posed) -> dict[str, Array]:
         """The places (links, 7) of each machine's links."""
-        places = {REAL: displacements(self.setting.mechanism, at.real.pose)}
+        places = {REAL: displacements(self.setup.mechanism, at.real.pose)}
         if self.hidden is not None and at.hidden is not None:
             q = at.hidden
             places[HIDDEN] = displacements(self.hidden.mechanism, lambda link: self.hidden.pose(q, link))
@@ -131,21 +131,21 @@ class Mover(Value):
 
     def with_error(self, at: Posed) -> ViewState:
         """The same with the error there."""
-        return replace(self.state(at), error=error(self.setting, at.real))
+        return replace(self.state(at), error=error(self.setup, at.real))
 
     def send(self, here: Posed, values: Array) -> tuple[Posed, Array]:
         """Where the robot comes to from ``here`` when the platform is sent to coordinates (n,), and those there."""
-        aim = Coordinates(self.setting.motion, self.coordinates.places, values)
-        there, _ = track(here.real, self.setting.motion, aim)
+        aim = Coordinates(self.setup.motion, self.coordinates.places, values)
+        there, _ = track(here.real, self.setup.motion, aim)
         followed = self.follow_hidden(here, [there])
         found = followed[-1] if followed else here
-        return found, values + aim.apart(found.real.pose(self.setting.motion.link))
+        return found, values + aim.apart(found.real.pose(self.setup.motion.link))
 
     def draw_to(self, here: Posed, X: Array) -> Posed:
         """Where the robot comes to from ``here`` when its platform is drawn to the pose X (4, 4): as near as it goes,
         lengths in characteristic lengths, turns in radians."""
-        motion = self.setting.motion
-        whole = Goal(
+        motion = self.setup.motion
+        whole = PoseTask(
             motion.link,
             motion.point,
             motion.home[:3, :3],
@@ -159,7 +159,7 @@ class Mover(Value):
 
     def read(self, posed: Posed) -> Array:
         """The coordinates (n,) of the platform."""
-        return self.coordinates.read(posed.real.pose(self.setting.motion.link))
+        return self.coordinates.read(posed.real.pose(self.setup.motion.link))
 
     def beside(self, at: ClosedConfiguration, q: Array) -> Posed | None:
         """The real robot with the hidden one at ``q``, None if that is at another pose or its directions at others."""
@@ -172,10 +172,10 @@ class Mover(Value):
         found = self.follow_hidden(self.home, [at])
         if not found:
             goal = Coordinates(
-                self.setting.motion, self.coordinates.places, self.coordinates.read(at.pose(self.setting.motion.link))
+                self.setup.motion, self.coordinates.places, self.coordinates.read(at.pose(self.setup.motion.link))
             )
-            halfway = goal.towards(self.home.real.pose(self.setting.motion.link), 0.5)
-            way = [track(self.home.real, self.setting.motion, each)[0] for each in (halfway, goal)]
+            halfway = goal.towards(self.home.real.pose(self.setup.motion.link), 0.5)
+            way = [track(self.home.real, self.setup.motion, each)[0] for each in (halfway, goal)]
             found = self.follow_hidden(self.home, [*way, at])
         return found[-1] if found and found[-1].real is at else Posed(at)
 
@@ -184,14 +184,14 @@ class Mover(Value):
         """Where each coordinate alone comes to, down and up, as far as small steps lead within its slider's span."""
         found = []
         for index, place in enumerate(self.coordinates.places):
-            span = TURN if place >= 3 else WAY * self.home.real.twin.length
+            span = TURN if place >= 3 else WAY * self.home.real.model.length
             down, up = self.coordinates.ends(self.home.real, index, (span, span))
             found.append((Posed(down), Posed(up)))
         return tuple(found)
 
     def far(self, values: Array) -> bool:
         """Whether coordinates (n,) are so far from home that no slider means them."""
-        spans = np.where(np.array(self.coordinates.places) >= 3, TURN, WAY * self.home.real.twin.length)
+        spans = np.where(np.array(self.coordinates.places) >= 3, TURN, WAY * self.home.real.model.length)
         return bool(np.any(np.abs(values - self.coordinates.values) > BEYOND_SLIDERS * spans))
 
     def sliders(self) -> tuple[Slider, ...]:
@@ -200,7 +200,7 @@ class Mover(Value):
 
     def _slider(self, index: int) -> Slider:
         home, turns = self.home, self.coordinates.places[index] >= 3
-        span = TURN if turns else WAY * home.real.twin.length
+        span = TURN if turns else WAY * home.real.model.length
         ways = self.coordinates.along(home.real, index, (span, span), STEPS)
         start = next(i for i, (_, at) in enumerate(ways) if at is home.real)
         down = self.follow_hidden(home, [at for _, at in reversed(ways[:start])])
@@ -232,12 +232,12 @@ class Mover(Value):
         assert self.hidden is not None
         return system(self.hidden, q, self._target(at))[0]
 
-    def _target(self, at: ClosedConfiguration) -> Target:
+    def _target(self, at: ClosedConfiguration) -> PoseAndValuesTask:
         """The pose and the directions that the hidden robot takes over; blind links are not in it."""
-        target = self.setting.samples.question.target(at)
+        target = self.setup.samples.observation_model.target(at)
         assert self.hidden is not None
         links = self.hidden.mechanism.links
-        return Target(
+        return PoseAndValuesTask(
             target.link,
             target.pose,
             target.point,

@@ -9,9 +9,9 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from ...analysis.analysis_declaration import analysis
 from ...analysis.derive import Derivation, derive
 from ...analysis.observed import POINTS, CameraLike, LegsLike, ObservedRobot, RobotLike, Seed, SeeLike
-from ...analysis.question import analysis
 from ...geometry.vectors import Array, orient_axis
 from ...kinematics.coordinates import Coordinates
 from ...kinematics.platform_motion import PlatformMotion
@@ -20,7 +20,7 @@ from ...mechanism.model import PlatformChoice
 from ...mechanism.observation import Observation
 from ...mechanism.observations.direction import Direction
 from ...options import option
-from ...progress import tell
+from ...progress import report
 from ...records import FLAT, As, Number, Recorded, Shown, recorded
 from ...results import Result, Value
 from ..outputs import OUTPUTS, function
@@ -78,7 +78,7 @@ class Arrow(Value):
 class View(Result, shown_as="view"):
     """All that the page needs. ``normal`` (3,) is that of the plane in which everything moves, None in space."""
 
-    setting: Annotated[ObservedRobot, FLAT]
+    setup: Annotated[ObservedRobot, FLAT]
     derivation: Derivation | None
     mover: Mover
     machines: tuple[Machine, ...]
@@ -91,7 +91,7 @@ class View(Result, shown_as="view"):
 
     def headline(self) -> str:
         """The robot, and how much there is to see of it."""
-        return f"{self.setting.robot.name}, {len(self.sliders)} sliders, {len(self.mode_outlines)} other assembly modes"
+        return f"{self.setup.robot.name}, {len(self.sliders)} sliders, {len(self.mode_outlines)} other assembly modes"
 
     @property
     @recorded(As("largest_distance"))
@@ -111,16 +111,16 @@ class View(Result, shown_as="view"):
         ``address`` and ``stop()``. Port 0 is any free port. Raises ``BadRequest``."""
         return function("studio.server:view_server")(self, port, open_)
 
-    dof = Shown(int, lambda self: self.setting.dof)
+    dof = Shown(int, lambda self: self.setup.dof)
     shown = Shown(dict[str, str], lambda self: {machine.key: machine.words for machine in self.machines})
     distance = Shown(Number, lambda self: self.home.distance)
 
     def scene(self) -> dict[str, Any]:
         """What the page is given."""
-        every = eyes(self.setting)
+        every = eyes(self.setup)
         return {
-            **stage(self.setting, self.machines, self.arrows),
-            "scale": scale(unit_of(self.setting)),
+            **stage(self.setup, self.machines, self.arrows),
+            "scale": scale(unit_of(self.setup)),
             "kept": True,
             "words": "; ".join(f"{machine.key} {machine.words}" for machine in self.machines),
             "legs": [{"name": arrow.leg, "watched": True} for arrow in self.arrows],
@@ -168,23 +168,23 @@ def view(
     if isinstance(robot, Mechanism) and robot.open_platform and not hidden:
         notes = (f"the sliders move link {robot.platform!r}: {robot.choice}",)
         robot = replace(robot, choice=PlatformChoice("guess", "the first that could be"))
-    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed, blind=not hidden)
-    derivation = derive(setting, seed=seed) if hidden else None
+    setup = ObservedRobot.of(robot, observe, camera, see=see, seed=seed, blind=not hidden)
+    derivation = derive(setup, seed=seed) if hidden else None
     other = None if derivation is None else derivation.hidden
-    mover = Mover.of(setting, other)
-    tell("sliders")
+    mover = Mover.of(setup, other)
+    report("sliders")
     sliders = mover.sliders()
-    tell("modes")
-    found, unlisted = mode_outlines(setting)
-    shapes, missing = meshes(setting)
+    report("modes")
+    found, unlisted = mode_outlines(setup)
+    shapes, missing = meshes(setup)
     home = mover.with_error(mover.home)
     states = (home, *(state for slider in sliders for state in slider.states))
     machines = [
         machine_of(
             REAL,
-            setting,
-            setting.mechanism,
-            str(setting.anatomy.architecture()),
+            setup,
+            setup.mechanism,
+            str(setup.decomposition.architecture()),
             [state.places[REAL] for state in states],
             shapes,
         )
@@ -193,7 +193,7 @@ def view(
         machines.append(
             machine_of(
                 HIDDEN,
-                setting,
+                setup,
                 other,
                 str(derivation.hidden_architecture),
                 [state.places[HIDDEN] for state in states],
@@ -202,9 +202,9 @@ def view(
         )
     elif hidden:
         notes = (*notes, "every leg is blind: there is no hidden robot")
-    arrows = tuple(arrows_of(setting, setting.observed))
+    arrows = tuple(arrows_of(setup, setup.observed))
     return View(
-        setting,
+        setup,
         derivation,
         mover,
         tuple(machines),
@@ -212,20 +212,20 @@ def view(
         sliders,
         arrows,
         found,
-        plane_normal(setting.motion),
+        plane_normal(setup.motion),
         (*notes, *unlisted, *missing),
     )
 
 
-def stage(setting: ObservedRobot, machines: Sequence[Machine], arrows: Iterable[Arrow]) -> dict[str, Any]:
+def stage(setup: ObservedRobot, machines: Sequence[Machine], arrows: Iterable[Arrow]) -> dict[str, Any]:
     """What any page is given of what stands on its stage."""
-    mechanism, normal = setting.mechanism, plane_normal(setting.motion)
+    mechanism, normal = setup.mechanism, plane_normal(setup.motion)
     places = {name: i for i, name in enumerate(mechanism.links)}
     return {
-        "name": setting.robot.name,
+        "name": setup.robot.name,
         "length": mechanism.length,
         "radius": _radius(mechanism),
-        "freedoms": {key: np.round(rows, PAGE_DIGITS).tolist() for key, rows in freedoms(setting).items()},
+        "freedoms": {key: np.round(rows, PAGE_DIGITS).tolist() for key, rows in freedoms(setup).items()},
         "normal": None if normal is None else np.round(normal, PAGE_DIGITS).tolist(),
         "machines": [machine.scene() for machine in machines],
         "arrows": [
@@ -234,11 +234,13 @@ def stage(setting: ObservedRobot, machines: Sequence[Machine], arrows: Iterable[
     }
 
 
-def freedoms(setting: ObservedRobot) -> dict[str, Array]:
+def freedoms(setup: ObservedRobot) -> dict[str, Array]:
     """The directions (k, 3) along which the platform is moved, and those about which it is turned: as many together as
     it has freedoms, those of its coordinates where it moves along or turns about more."""
-    motion = setting.motion
-    places = np.array(Coordinates.of(setting.everything.start, setting.everything.question, motion).places, dtype=int)
+    motion = setup.motion
+    places = np.array(
+        Coordinates.of(setup.all_samples.start, setup.all_samples.observation_model, motion).places, dtype=int
+    )
     found = {}
     for key, span, at in (
         ("translations", motion.translations, places[places < 3]),
@@ -249,20 +251,20 @@ def freedoms(setting: ObservedRobot) -> dict[str, Array]:
 
 
 def machine_of(
-    key: str, setting: ObservedRobot, mechanism: Mechanism, words: str, places: Sequence[Array], meshes: Sequence[Shape]
+    key: str, setup: ObservedRobot, mechanism: Mechanism, words: str, places: Sequence[Array], meshes: Sequence[Shape]
 ) -> Machine:
     """A mechanism to be drawn, ``key`` real or hidden, its rails as long as it slides in the ``places`` (links, 7)."""
-    real = setting.mechanism
+    real = setup.mechanism
     kept = tuple(shape for shape in meshes if shape.link in mechanism.links)
-    drawer = Drawer(mechanism, real, setting.anatomy.platform, _radius(real), kept)
+    drawer = Drawer(mechanism, real, setup.decomposition.platform, _radius(real), kept)
     shapes = drawer.shapes(_travels(drawer, places))
     frames = tuple((link, place(mechanism.links[link].pose)) for link in (mechanism.base, mechanism.platform))
-    legs = {link: leg.label for leg in setting.anatomy.legs for link in leg.links}
+    legs = {link: leg.label for leg in setup.decomposition.legs for link in leg.links}
     return Machine(
         key,
         words,
         tuple(mechanism.links),
-        setting.anatomy.platform,
+        setup.decomposition.platform,
         shapes,
         frames,
         tuple(map(legs.get, mechanism.links)),
@@ -288,9 +290,9 @@ def _travels(drawer: Drawer, states: Sequence[Array]) -> dict[str, tuple[float, 
     return found
 
 
-def arrows_of(setting: ObservedRobot, observations: Iterable[Observation]) -> Iterator[Arrow]:
+def arrows_of(setup: ObservedRobot, observations: Iterable[Observation]) -> Iterator[Arrow]:
     """An arrow on the middle of each link with a direction, along what is or could be observed."""
-    mechanism = setting.mechanism
+    mechanism = setup.mechanism
     for seen in observations:
         if not isinstance(seen, Direction):
             continue

@@ -21,7 +21,7 @@ Turning = tuple[VirtualChain, Array | None]
 
 def find(state: State, evidence: Evidence, chain: VirtualChain) -> Iterator[Match[Turning]]:
     """The locus of the chain's direction; nothing where that moves in two ways."""
-    observations = evidence.samples.question.observations
+    observations = evidence.samples.observation_model.observations
     own = [i for i, o in enumerate(observations) if o.leg == chain.leg]
     index = next((i for i in own if observations[i].link == chain.link), own[0])
     found = locus(evidence.directions(index), 1.0)

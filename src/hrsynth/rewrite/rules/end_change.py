@@ -69,7 +69,9 @@ def _ends(state: State, evidence: Evidence, chain: VirtualChain) -> LegEnds | No
     mechanism, leg = state.mechanism, state.real.leg(chain.leg)
     actuator = mechanism.joints[chain.actuator]
     ends = [
-        j for j in mechanism.joints_of(leg.attach) if j.type is JointType.SPHERICAL and j.other(leg.attach) in leg.links
+        j
+        for j in mechanism.joints_of(leg.platform_link)
+        if j.type is JointType.SPHERICAL and j.other(leg.platform_link) in leg.links
     ]
     if actuator.type is not JointType.UNIVERSAL or not ends:
         return None
@@ -79,7 +81,7 @@ def _ends(state: State, evidence: Evidence, chain: VirtualChain) -> LegEnds | No
         for j in mechanism.joints_of(rod)
         if j.other(rod) == chain.carrier
     ]
-    return LegEnds(chain, leg.attach, ends, beside, (actuator.axes[0], actuator.axes[1]), False)
+    return LegEnds(chain, leg.platform_link, ends, beside, (actuator.axes[0], actuator.axes[1]), False)
 
 
 def apply(state: State, found: list[LegEnds]) -> State:

@@ -29,7 +29,7 @@ def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[str] | Re
         yield Refusal("the leg carries what is observed or sees")
         return
     observed = state.observed_labels()
-    ends = dict.fromkeys(each.attach for each in state.real.legs if each.label in observed)
+    ends = dict.fromkeys(each.platform_link for each in state.real.legs if each.label in observed)
     bodies = dict.fromkeys((*ends, *sorted(state.watched)))
     yield Match(
         leg,

@@ -14,19 +14,19 @@ from dataclasses import dataclass, replace
 
 from ...geometry.vectors import Array, pose
 from ...mechanism import Joint, JointType, Link, Motor, Observation
+from ...mechanism.cameras import CameraObservation, VirtualJoint
 from ...mechanism.observations.direction import SeenAxis
 from ...mechanism.observations.encoder import Encoder
-from ...mechanism.sights import CameraObservation, VirtualJoint
 from ..evidence import Evidence, ProximalChain
 from ..rule import AXES, Match, Rule, Stage, whole_leg
-from ..state import SensorChain, State, VirtualChain
+from ..state import ObservationChain, State, VirtualChain
 
 SEGMENT = ("slide_x", "slide_y", "slide_z", "virtual", "roll"), ("guide_x", "guide_y", "carrier", "bearing")
 """The names of the joints and links of a direction's chain."""
 
 
 @dataclass(frozen=True, eq=False)
-class Lifting:
+class LiftedChain:
     """A chain to be hung between ``reference`` and ``link``, of an observation of the label ``leg``; ``proximal`` is
     the part before ℓ, None for what is no direction of a segment; ``tag`` tells the chain's names from others."""
 
@@ -39,10 +39,10 @@ class Lifting:
     proximal: ProximalChain | None = None
 
 
-def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[list[Lifting | Encoder]]]:
+def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[list[LiftedChain | Encoder]]]:
     """One match for each leg: a chain for each of its observations."""
-    found: list[Lifting | Encoder] = []
-    for index, observation in enumerate(evidence.samples.question.observations):
+    found: list[LiftedChain | Encoder] = []
+    for index, observation in enumerate(evidence.samples.observation_model.observations):
         if observation.leg != leg:
             continue
         tag = f"{leg}_{index}" if found else leg
@@ -63,7 +63,7 @@ def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[list[Lift
     yield Match(found, "; ".join(words))
 
 
-def _segment(state: State, evidence: Evidence, seen: Observation, index: int, tag: str) -> Lifting:
+def _segment(state: State, evidence: Evidence, seen: Observation, index: int, tag: str) -> LiftedChain:
     """The chain of a direction, its anchor A where the leg's joint K is."""
     assert isinstance(seen, SeenAxis)
     links, reference = state.mechanism.links, state.mechanism.reference
@@ -71,25 +71,25 @@ def _segment(state: State, evidence: Evidence, seen: Observation, index: int, ta
     proximal, before = evidence.proximal(link), evidence.joints_before(link)
     anchor = proximal.anchor if proximal else before[0].point if before else links[link].pose[:3, 3]
     at = seen.sighting(links[reference].pose, links[seen.link].pose, evidence.far(index))
-    return Lifting(seen.leg, tag, link, reference, seen.chain(replace(at, B=anchor)), True, proximal)
+    return LiftedChain(seen.leg, tag, link, reference, seen.chain(replace(at, B=anchor)), True, proximal)
 
 
-def _sensor(state: State, evidence: Evidence, seen: Observation, index: int, tag: str) -> Lifting:
+def _sensor(state: State, evidence: Evidence, seen: Observation, index: int, tag: str) -> LiftedChain:
     """The chain of any other observation."""
     assert isinstance(seen, SeenAxis | CameraObservation)
     links, reference = state.mechanism.links, seen.seen_from or state.mechanism.reference
     at = seen.sighting(links[reference].pose, links[seen.link].pose, evidence.far(index))
-    return Lifting(seen.leg, tag, seen.link, reference, seen.chain(at), False)
+    return LiftedChain(seen.leg, tag, seen.link, reference, seen.chain(at), False)
 
 
-def apply(state: State, found: list[Lifting | Encoder]) -> State:
+def apply(state: State, found: list[LiftedChain | Encoder]) -> State:
     """The robot with these chains, and these joints actuated."""
     for each in found:
         state = _encode(state, each) if isinstance(each, Encoder) else _lift(state, each)
     return state
 
 
-def _lift(state: State, lifting: Lifting) -> State:
+def _lift(state: State, lifting: LiftedChain) -> State:
     mechanism, tag = state.mechanism, lifting.tag
     count = len(lifting.joints)
     names, between = (
@@ -110,7 +110,7 @@ def _lift(state: State, lifting: Lifting) -> State:
     changed = mechanism.changed(links=links, joints=joints)
     if not lifting.segment:
         driven = tuple(joint.name for joint in joints if joint.actuated)
-        sensor = SensorChain(
+        sensor = ObservationChain(
             lifting.leg, lifting.link, lifting.reference, tuple(link_names), tuple(joint_names), driven
         )
         return replace(state, mechanism=changed, sensors=(*state.sensors, sensor))
@@ -145,7 +145,7 @@ def _encode(state: State, seen: Encoder) -> State:
     if joint.actuated:
         return state
     changed = state.mechanism.changed(joints=[replace(joint, motor=Motor(joint.name))])
-    sensor = SensorChain(seen.leg, seen.link, str(seen.seen_from), (), (), (joint.name,))
+    sensor = ObservationChain(seen.leg, seen.link, str(seen.seen_from), (), (), (joint.name,))
     return replace(state, mechanism=changed, sensors=(*state.sensors, sensor))
 
 

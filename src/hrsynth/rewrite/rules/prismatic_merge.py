@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from ..evidence import Evidence
 from ..rule import AXES, Match, Refusal, Rule, Stage, each_chain
 from ..state import State, VirtualChain
-from .takeover import Substitution, apply, substitution
+from .joint_substitution import Substitution, apply, substitution
 
 
 def find(state: State, evidence: Evidence, chain: VirtualChain) -> Iterator[Match[Substitution | None] | Refusal]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ...dialect import Dialect, RobotFile
+from ...file_format import FileFormat, RobotFile
 from .settings import ENDINGS, partner, settings_beside
 
 
@@ -16,4 +16,4 @@ def _knows(file: RobotFile) -> bool:
     return file.root is None or settings_beside(file) is not None
 
 
-DIALECT = Dialect("gepetto", _knows, ENDINGS, _files, rank=-1, partner=partner)
+DIALECT = FileFormat("gepetto", _knows, ENDINGS, _files, rank=-1, partner=partner)

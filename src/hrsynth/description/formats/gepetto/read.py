@@ -13,7 +13,7 @@ from ....geometry.vectors import Array
 from ....mechanism.model import JointType, Motor, Note
 from ... import xml
 from ...chains import CUT, END, WELD
-from ...dialect import RobotFile
+from ...file_format import RobotFile
 from ...jointgraph import FrameSpec, JointGraph
 from ...vocabulary import misspelt
 from ..urdf.read import read as read_urdf

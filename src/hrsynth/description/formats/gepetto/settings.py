@@ -11,7 +11,7 @@ from typing import Any
 from ....budgets import LARGEST_BESIDE, LARGEST_YAML, MOST_BESIDE
 from ....errors import BadRobotFile
 from ... import xml
-from ...dialect import RobotFile
+from ...file_format import RobotFile
 
 ENDINGS = (".yaml", ".yml")
 KEYS = ("closed_loop", "type", "name_mot", "joint_name", "joint_type")

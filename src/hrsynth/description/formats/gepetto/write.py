@@ -9,7 +9,7 @@ from typing import Any
 from ....geometry.vectors import pose
 from ....mechanism.model import Joint, JointType, Link, Mechanism
 from ...chains import CUT, END, WELD
-from ...dialect import Written
+from ...file_format import Written
 from ...reduction import reduce
 from ..native.write import joint_names, text
 

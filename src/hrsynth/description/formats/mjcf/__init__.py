@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from ...dialect import Dialect
+from ...file_format import FileFormat
 
-DIALECT = Dialect("mjcf", lambda file: file.tag == "mujoco", (".xml", ".mjcf"), meshes=(".stl", ".obj", ".msh"))
+DIALECT = FileFormat("mjcf", lambda file: file.tag == "mujoco", (".xml", ".mjcf"), meshes=(".stl", ".obj", ".msh"))

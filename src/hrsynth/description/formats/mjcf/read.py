@@ -10,10 +10,10 @@ from ....geometry.vectors import Array, frozen, inverse, pose
 from ....mechanism.model import JointType, Limits, Link, Motor, fresh_name
 from ... import numerals, xml
 from ...annotations import PREFIX, drop_world, read_annotation
-from ...dialect import RobotFile
 from ...elements import XmlReader
-from ...jointgraph import ORIGIN, FrameSpec, GearSpec, JointGraph, JointSpec, comma_list
-from ...postures import from_keyframe
+from ...file_format import RobotFile
+from ...jointgraph import ORIGIN, CouplingSpec, FrameSpec, JointGraph, JointSpec, comma_list
+from ...keyframes import from_keyframe
 from ..paired import onshape_pairs, other_pairs
 from .content import BodyContents
 from .defaults import Compiler, Defaults, with_includes
@@ -249,7 +249,7 @@ class _MjcfReader(XmlReader):
             self.defect(line, f"joint equality {name!r}: a curve", given.get("polycoef"), "a straight line")
         else:
             offset, ratio = (float(value) for value in coefficients[:2])
-            graph.gears.append(GearSpec(name, driver, driven, ratio, offset, line))
+            graph.gears.append(CouplingSpec(name, driver, driven, ratio, offset, line))
 
     def _keyframes(self) -> None:
         """The postures of ``<keyframe>``, by name or number; those with other than the model's coordinates are told."""

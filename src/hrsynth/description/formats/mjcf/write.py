@@ -14,7 +14,7 @@ from ... import numerals, xml
 from ...annotations import PREFIX, annotations_of
 from ...chains import SECOND
 from ...contents import SIZES, unsaid
-from ...dialect import Written
+from ...file_format import Written
 from ...jointgraph import comma_list
 from ...reduction import reduce, require_free_world
 from ...tree import outward

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...dialect import Dialect, RobotFile
+from ...file_format import FileFormat, RobotFile
 from .read import parse
 from .write import text as write
 
@@ -13,4 +13,4 @@ def _knows(file: RobotFile) -> bool:
     return file.tag == "robot" and file.strict and file.has("hrsynth")
 
 
-DIALECT = Dialect("native", _knows, (".urdf",), rank=1)
+DIALECT = FileFormat("native", _knows, (".urdf",), rank=1)

@@ -12,16 +12,16 @@ from lxml import etree
 from ....errors import BadRobotFile
 from ....geometry.vectors import Array
 from ....mechanism import graphs
+from ....mechanism.cameras import NamedCamera
 from ....mechanism.model import FIRST, NAMED, Joint, JointType, Limits, Mechanism, Motor
 from ....mechanism.observations.direction import Direction
-from ....mechanism.sights import NamedCamera
 from ....tolerances import NO_FINER, SAME_DIRECTION, SAME_GEOMETRY
 from ... import chains, xml
-from ...dialect import RobotFile
 from ...elements import LIMITS, TURNS
+from ...file_format import RobotFile
 from ...jointgraph import JointSpec, TreeJoint, first_body, zero_poses
 from ...jointmotion import require_closed, residual
-from ...sights import SightSpec, as_written
+from ...observation_text import ObservationSpec, as_written
 from ..urdf.elements import INTERFACE, UrdfReader, is_sight, simple_transmission
 from ..urdf.names import NAMES
 
@@ -60,7 +60,7 @@ class _NativeReader(UrdfReader):
     platform: str | None = None
     formation: bool = False
     turns: bool | None = None
-    seen: list[SightSpec] = field(default_factory=list)
+    seen: list[ObservationSpec] = field(default_factory=list)
     cameras: list[NamedCamera] = field(default_factory=list)
     camera: str | None = None
     serial: bool = False
@@ -334,7 +334,7 @@ class _NativeReader(UrdfReader):
         if not (self.tolerance or self.digits.last_place):
             return None
         from ...assembly.build import joint_at, rounding
-        from ...assembly.idealise import as_meant
+        from ...assembly.geometry_repair import snap_geometry
 
         opening = max(residual(joint, X_P, X_S, mechanism.length) for joint, X_P, X_S in loops)
         tolerance = self.tolerance or rounding(self.digits, mechanism.length, opening)
@@ -342,4 +342,4 @@ class _NativeReader(UrdfReader):
             return None
         self.require_sound()
         between = [replace(joint_at(joint, poses, False), motor=self.motors.get(joint.name)) for joint, _, _ in loops]
-        return as_meant(self.with_sensors(chains.merge(mechanism.changed(joints=between))), opening, tolerance)
+        return snap_geometry(self.with_sensors(chains.merge(mechanism.changed(joints=between))), opening, tolerance)

@@ -16,9 +16,9 @@ from ....mechanism.screws import elementary
 from ....tolerances import AT_ORIGIN, SAME_DIRECTION
 from ... import chains, numerals, xml
 from ...annotations import IMAGE, camera_attributes
-from ...dialect import Written
+from ...file_format import Written
 from ...jointgraph import LOOP_TYPES, ORIGIN
-from ...sights import attributes_of
+from ...observation_text import attributes_of
 from ...tree import outward, spanning
 from ..urdf.elements import simple_transmission
 

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from ...dialect import Dialect
+from ...file_format import FileFormat
 
-DIALECT = Dialect("sdf", lambda file: file.tag in ("sdf", "gazebo"), (".sdf",))
+DIALECT = FileFormat("sdf", lambda file: file.tag in ("sdf", "gazebo"), (".sdf",))

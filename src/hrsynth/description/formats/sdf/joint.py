@@ -13,7 +13,7 @@ from ....tolerances import NOISE, WITHOUT_DIRECTION
 from ... import xml
 from ...chains import part
 from ...elements import XmlReader, sound_limits
-from ...jointgraph import ORIGIN, FrameSpec, GearSpec, JointGraph, JointSpec
+from ...jointgraph import ORIGIN, CouplingSpec, FrameSpec, JointGraph, JointSpec
 
 TYPES = {
     "revolute": "R",
@@ -103,14 +103,14 @@ def add(
         kind_of_second = JointType.REVOLUTE if kind == "U" else JointType.PRISMATIC
         graph.joints[second] = JointSpec(second, kind_of_second, (between, two), axes[-1:], line=line, in_tree=in_tree)
         if kind == "H":
-            graph.gears.append(GearSpec(f"{name}__thread", first, second, _lead(reader, element, name), line=line))
+            graph.gears.append(CouplingSpec(f"{name}__thread", first, second, _lead(reader, element, name), line=line))
     else:
         limit = element.find("axis/limit")
         limits = sound_limits(lambda key: text(limit, key))
         graph.joints[name] = JointSpec(name, JointType(kind), (one, two), axes, limits, (), line, None, in_tree)
 
 
-def mimics(reader: XmlReader, joints: Iterable[tuple[str, xml.Element]]) -> list[GearSpec]:
+def mimics(reader: XmlReader, joints: Iterable[tuple[str, xml.Element]]) -> list[CouplingSpec]:
     """What ``<mimic>`` says: q = multiplier × (q of the other joint − reference) + offset."""
     found = []
     for prefix, element in joints:
@@ -122,7 +122,7 @@ def mimics(reader: XmlReader, joints: Iterable[tuple[str, xml.Element]]) -> list
             )
             if name is not None and driver is not None:
                 found.append(
-                    GearSpec(
+                    CouplingSpec(
                         f"mimic_{prefix}{name}",
                         prefix + driver,
                         prefix + name,
@@ -177,7 +177,7 @@ def _add_gear(reader: XmlReader, graph: JointGraph, element: xml.Element, links:
     """A gearbox couples the two revolute joints on its reference body: θ₂ = −ratio θ₁."""
     body = text(element, "gearbox_reference_body")
     ratio = -float(numbers(reader, element.find("gearbox_ratio"), (1.0,))[0])
-    graph.gears.append(GearSpec(name, f"{body}\n{links[0]}", f"{body}\n{links[1]}", ratio, line=xml.line(element)))
+    graph.gears.append(CouplingSpec(name, f"{body}\n{links[0]}", f"{body}\n{links[1]}", ratio, line=xml.line(element)))
 
 
 def name_gears(reader: XmlReader, graph: JointGraph) -> None:

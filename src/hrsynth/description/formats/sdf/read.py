@@ -13,10 +13,10 @@ from ....mechanism.model import Link
 from ....tolerances import SAME_GEOMETRY
 from ... import xml
 from ...annotations import NAMESPACE, drop_world, read_annotation
-from ...dialect import RobotFile
 from ...elements import XmlReader
+from ...file_format import RobotFile
 from ...jointgraph import ORIGIN, FrameSpec, JointGraph, comma_list
-from ...postures import value_of
+from ...keyframes import value_of
 from ..extensions import read_drake, read_plugins
 from ..paired import onshape_pairs, other_pairs
 from .content import read_content

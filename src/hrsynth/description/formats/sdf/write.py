@@ -14,7 +14,7 @@ from ... import numerals, xml
 from ...annotations import NAMESPACE, PREFIX, annotations_of
 from ...chains import BODY
 from ...contents import SIZES, content_of, unsaid
-from ...dialect import Written
+from ...file_format import Written
 from ...jointgraph import comma_list
 from ...reduction import reduce, require_free_world
 from .content import write_content, write_pose

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from ...dialect import Dialect
+from ...file_format import FileFormat
 
-DIALECT = Dialect("urdf", lambda file: file.tag == "robot", rank=2)
+DIALECT = FileFormat("urdf", lambda file: file.tag == "robot", rank=2)

@@ -10,13 +10,13 @@ from lxml import etree
 
 from ....errors import BadRequest
 from ....geometry.vectors import Array
+from ....mechanism.cameras import NamedCamera
 from ....mechanism.model import Coupling, JointType, Limits, Link, Motor
 from ....mechanism.screws import elementary
-from ....mechanism.sights import NamedCamera
 from ... import xml
 from ...elements import XmlReader
 from ...jointgraph import LOOP_TYPES, ORIGIN, FrameSpec, JointSpec
-from ...sights import SightSpec, spec_of
+from ...observation_text import ObservationSpec, spec_of
 
 TREE_TYPES = {
     "revolute": JointType.REVOLUTE,
@@ -201,10 +201,10 @@ class UrdfReader(XmlReader):
             if name and one.link and two.link:
                 self.couplings.append(Coupling(name, one.link, two.link, value, xml.line(element)))
 
-    def sights(self, own: xml.Element) -> tuple[list[SightSpec], list[NamedCamera]]:
+    def sights(self, own: xml.Element) -> tuple[list[ObservationSpec], list[NamedCamera]]:
         """The observations in ``<hrsynth>`` that are no directions seen from its own camera, and the cameras that have
         a name."""
-        specs, cameras = list[SightSpec](), list[NamedCamera]()
+        specs, cameras = list[ObservationSpec](), list[NamedCamera]()
         for element in own.findall("camera"):
             if element.get("name") is not None:
                 name, link = self.attribute(element, "name"), self.attribute(element, "link")

@@ -10,9 +10,9 @@ import numpy as np
 from ....mechanism.model import JointType, Limits, Link, Motor
 from ....mechanism.observations.direction import Direction
 from ... import xml
-from ...dialect import RobotFile
 from ...elements import TURNS, sound_limits
-from ...jointgraph import GearSpec, JointGraph, comma_list
+from ...file_format import RobotFile
+from ...jointgraph import CouplingSpec, JointGraph, comma_list
 from ..extensions import DRAKE, is_drake, local
 from .conventions import CONVENTIONS
 from .elements import TREE_TYPES, UrdfReader, is_sight
@@ -46,7 +46,7 @@ def read(file: RobotFile, *, frames: bool = True) -> JointGraph:
 @dataclass
 class _TolerantReader(UrdfReader):
     notes: list[tuple[str, str]] = field(default_factory=list)
-    mimics: list[GearSpec] = field(default_factory=list)
+    mimics: list[CouplingSpec] = field(default_factory=list)
     carried: set[str | None] = field(default_factory=set)
 
     def graph(self, frames: bool) -> JointGraph:
@@ -84,7 +84,7 @@ class _TolerantReader(UrdfReader):
                 for key, default in (("multiplier", 1.0), ("offset", 0.0))
             )
             if name is not None and driver is not None:
-                self.mimics.append(GearSpec(f"mimic_{name}", driver, name, ratio, offset, xml.line(mimic)))
+                self.mimics.append(CouplingSpec(f"mimic_{name}", driver, name, ratio, offset, xml.line(mimic)))
 
     def limits(self, element: xml.Element, kind: str | None) -> Limits | None:
         limit = element.find("limit")
@@ -131,7 +131,7 @@ class _TolerantReader(UrdfReader):
                 self.defect(coupling.line, f"coupling {coupling.name!r}: a link that no joint carries")
             else:
                 graph.gears.append(
-                    GearSpec(coupling.name, str(ends[0]), str(ends[1]), coupling.ratio, 0.0, coupling.line)
+                    CouplingSpec(coupling.name, str(ends[0]), str(ends[1]), coupling.ratio, 0.0, coupling.line)
                 )
         graph.follow(self.mimics)
 

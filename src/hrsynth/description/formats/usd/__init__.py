@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ...dialect import Dialect
+from ...file_format import FileFormat
 
 _TEXT, _BINARY = (b"#usda", b"#sdf"), (b"PXR-USDC", b"PK\x03\x04")
 
@@ -18,7 +18,7 @@ def _pack(text: str, path: Path) -> bytes:
     return binary(text, path)
 
 
-DIALECT = Dialect(
+DIALECT = FileFormat(
     "usd",
     lambda file: file.start.startswith((*_TEXT, *_BINARY)),
     (".usda", ".usd", ".usdc"),

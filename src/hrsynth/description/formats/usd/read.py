@@ -20,8 +20,8 @@ from ... import xml
 from ...annotations import PREFIX, drop_world, read_annotation
 from ...chains import part
 from ...contents import Content, Inertial, Solid, along_z, fragments
-from ...dialect import RobotFile
-from ...jointgraph import ORIGIN, FrameSpec, GearSpec, JointGraph, JointSpec, comma_list
+from ...file_format import RobotFile
+from ...jointgraph import ORIGIN, CouplingSpec, FrameSpec, JointGraph, JointSpec, comma_list
 from ...jointmotion import residual
 from ...numerals import exact_vector
 from .stage import prims
@@ -453,7 +453,7 @@ class _StageReader:
                 offset = -_number(prim.values.get(f"{stem}offset")) * (math.pi / 180 if turns else self.metres)
                 label = prim.values.get(f"{PREFIX}:coupling")
                 title = label if isinstance(label, str) else self.result.fresh(f"mimic_{prim.name}")
-                self.result.gears.append(GearSpec(title, *names, ratio, offset or 0.0))
+                self.result.gears.append(CouplingSpec(title, *names, ratio, offset or 0.0))
 
     def _stand(self, graph: JointGraph) -> None:
         """Joints count from where the file puts their bodies, where that is a motion of theirs."""

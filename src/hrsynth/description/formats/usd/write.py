@@ -20,7 +20,7 @@ from ....mechanism.model import Joint, JointType, Limits, Mechanism, Note
 from ... import numerals
 from ...annotations import PREFIX, annotations_of
 from ...contents import SIZES, Content, Solid, content_of, principal, unsaid
-from ...dialect import Written
+from ...file_format import Written
 from ...jointgraph import comma_list
 from ...meshes import triangles
 from ...tree import outward, spanning

@@ -21,9 +21,9 @@ from .watch import smallest
 def answer(request: Request) -> dict[str, Any]:
     """Three sentences about a robot at its zero configuration, of the smallest sets of legs that see most the one with
     the least error there."""
-    setting = ObservedRobot.of(request.mechanism, "all", request.camera)
-    found = [(watching(setting, each), each) for each in smallest(setting)]
-    start = setting.everything.start
+    setup = ObservedRobot.of(request.mechanism, "all", request.camera)
+    found = [(watching(setup, each), each) for each in smallest(setup)]
+    start = setup.all_samples.start
     chosen, verdict = min(found, key=lambda pair: _size(error(pair[0], start)))
     legs = list(verdict.legs) if verdict.rank else []
     return {
@@ -33,9 +33,9 @@ def answer(request: Request) -> dict[str, Any]:
     }
 
 
-def watching(setting: ObservedRobot, verdict: Verdict) -> ObservedRobot:
+def watching(setup: ObservedRobot, verdict: Verdict) -> ObservedRobot:
     """The robot with the legs of a verdict watched."""
-    return replace(setting, observed=tuple(each for each in setting.observed if each.leg in verdict.legs))
+    return replace(setup, observed=tuple(each for each in setup.observed if each.leg in verdict.legs))
 
 
 def _size(wrong: dict[str, Any]) -> float:
@@ -43,10 +43,10 @@ def _size(wrong: dict[str, Any]) -> float:
     return np.inf if value is None else float(value)
 
 
-def rest(setting: ObservedRobot) -> list[str]:
+def rest(setup: ObservedRobot) -> list[str]:
     """How wrong the platform can be at the zero configuration, and where else the loop may stop."""
-    first = home_error(error(setting, setting.everything.start))
+    first = home_error(error(setup, setup.all_samples.start))
     try:
-        return [first, elsewhere(modes(setting))]
+        return [first, elsewhere(modes(setup))]
     except HrsynthError as problem:
         return [first, f"Other poses at which the loop may stop could not be listed: {problem}."]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ....analysis.aspects.atlas import Atlas, atlas
+from ....analysis.aspects.aspects import AspectTable, aspects
 from ...text.poses import aspect_groups, pair_words
 from ..commands import lines_at
 from ..request import Request
@@ -13,9 +13,9 @@ from ..request import Request
 def answer(request: Request) -> dict[str, Any]:
     """The modes by their numbers, those together that lie in one aspect, and what shows it of which two; ``aspect`` is
     the number of each mode's where every verdict is certified, else null."""
-    setting = request.seeing()
+    setup = request.seeing()
     here = request.here(request.mover())
-    found = atlas(setting, at=here.real)
+    found = aspects(setup, at=here.real)
     known = len(set(found.count)) == 1 and all(pair.certified for pair in found.pairs)
     return {
         "groups": [list(group) for group in found.groups],
@@ -27,11 +27,11 @@ def answer(request: Request) -> dict[str, Any]:
         "pairs": [
             f"modes {one} and {other}: {pair_words(pair)}" for pair in found.pairs for one, other in [pair.numbers]
         ],
-        **lines_at(request, "atlas", setting, here.real),
+        **lines_at(request, "aspects", setup, here.real),
     }
 
 
-def words(found: Atlas) -> str:
+def words(found: AspectTable) -> str:
     """How many aspects hold them."""
     if not found.groups:
         return "no aspect: there is no mode at which the robot was found assembled"

@@ -34,7 +34,7 @@ def answer(request: Request) -> dict[str, Any]:
 def _page(request: Request) -> tuple[str, bytes, dict[str, str]]:
     found = view(request.seeing(), hidden=True)
     (each,) = OUTPUTS["view"].files
-    name = found.setting.robot.name
+    name = found.setup.robot.name
     same = lines(request, "view", "--static", f"{name}.html", hidden=True)
     return name, _bytes(each.content(found, ".html", {})[0]), same
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ....description import load, shipped
+from ....description import list_robots, load
 from ....families.table import ROBOTS
 from ....geometry.vectors import Array, orient_axis
 from ....mechanism import JointType, Mechanism
@@ -41,14 +41,14 @@ def robots() -> list[dict[str, Any]]:
             "words": f"{parse(known[name].architecture)}, {known[name].dof} freedoms",
             "picture": picture(load(name)),
         }
-        for name in shipped()
+        for name in list_robots()
     ]
 
 
 def picture(robot: Mechanism) -> str:
     """A small drawing of a robot."""
-    anatomy = decompose(normal_form(robot).mechanism)
-    portrait = Portrait.draw(anatomy.mechanism, anatomy.platform, (), flat(anatomy.mechanism))
+    decomposition = decompose(normal_form(robot).mechanism)
+    portrait = Portrait.draw(decomposition.mechanism, decomposition.platform, (), flat(decomposition.mechanism))
     return portrait.svg(WIDTH, HEIGHT, robot.name)
 
 

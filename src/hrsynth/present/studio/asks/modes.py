@@ -19,25 +19,25 @@ from ..request import Request
 
 def answer(request: Request) -> dict[str, Any]:
     """All assembly modes with the directions at ``here``, and whether these are all."""
-    setting = request.seeing()
+    setup = request.seeing()
     here = request.here(request.mover())
-    found = modes(setting, at=here.real)
+    found = modes(setup, at=here.real)
     return {
         "modes": [
             *(_mode(request, found, number, mode) for number, mode in enumerate(found.modes, 1)),
-            *(_near(request, found, number, mode) for number, mode in enumerate(found.near, 1)),
+            *(_near(request, found, number, mode) for number, mode in enumerate(found.near_modes, 1)),
         ],
         "words": words(found),
-        **lines_at(request, "modes", setting, here.real),
+        **lines_at(request, "modes", setup, here.real),
     }
 
 
 def words(found: AssemblyModes) -> str:
     """How many there are, and by which proof these are all."""
-    if found.found.continuum is not None and found.found.complex is not None:
-        return f"a continuum of poses: {found.found.degenerate}"
-    more = "" if found.found.degenerate is None else f"; {found.found.degenerate}"
-    alike = f"{found.alike}; " if found.near else ""
+    if found.found.continuous_family is not None and found.found.complex is not None:
+        return f"a continuum of poses: {found.found.singular_solutions}"
+    more = "" if found.found.singular_solutions is None else f"; {found.found.singular_solutions}"
+    alike = f"{found.alike}; " if found.near_modes else ""
     return f"{alike}{found.count}, {all_of(found)}; {found.found.proof}{more}"
 
 
@@ -46,19 +46,19 @@ def _mode(request: Request, found: AssemblyModes, number: int, mode: AssemblyMod
         there = at_mode(found, ModeNumber(number))
     except PoseNotReached:
         there = None
-    told = "the pose itself" if mode.goal else assembly(mode, found.setting.unlimited)[0]
+    told = "the pose itself" if mode.goal else assembly(mode, found.setup.limits_ignored)[0]
     return _told(request, found, f"mode {number}", mode, told, there)
 
 
 def _near(request: Request, found: AssemblyModes, number: int, mode: NearMode) -> dict[str, Any]:
-    told = f"differs {mode.differs}; {assembly(mode, found.setting.unlimited)[0]}"
+    told = f"differs {mode.differs}; {assembly(mode, found.setup.limits_ignored)[0]}"
     return _told(request, found, f"near {number}", mode, told, mode.configuration)
 
 
 def _told(
     request: Request, found: AssemblyModes, label: str, mode: AssemblyMode, told: str, there: ClosedConfiguration | None
 ) -> dict[str, Any]:
-    drawn = outline(found.setting, label, mode)
+    drawn = outline(found.setup, label, mode)
     return {
         **drawn.scene(),
         "words": f"{drawn.words}: {told}",

@@ -42,9 +42,9 @@ def _draw_pose(request: Request, mover: Mover, here: Posed, place: Any) -> dict[
     size = float(np.linalg.norm(place[3:]))
     if not 0.5 < size < 2.0:
         raise BadRequest("platform", place.tolist(), "a position and a unit quaternion")
-    link = mover.setting.motion.link
-    wanted = pose(place[:3], rotation_of(place[[6, 3, 4, 5]] / size)) @ mover.setting.mechanism.links[link].pose
-    if float(np.linalg.norm(place[:3])) > BEYOND_SLIDERS * mover.home.real.twin.length:
+    link = mover.setup.motion.link
+    wanted = pose(place[:3], rotation_of(place[[6, 3, 4, 5]] / size)) @ mover.setup.mechanism.links[link].pose
+    if float(np.linalg.norm(place[:3])) > BEYOND_SLIDERS * mover.home.real.model.length:
         raise BadRequest("platform", place.tolist(), f"within {BEYOND_SLIDERS:g} sizes of the robot")
     found = mover.draw_to(here, wanted)
     apart = np.abs(found.real.pose(link) - wanted).max()
@@ -64,5 +64,5 @@ def describe_pose(request: Request, mover: Mover, posed: Posed, stopped: bool = 
 
 def state(request: Request, mover: Mover, posed: Posed) -> dict[str, Any]:
     """What is drawn of a configuration, how wrong the platform can be there, and the joints beyond their limits."""
-    wrong = nothing(unit_of(mover.setting), "no leg is watched") if request.blind else error(mover.setting, posed.real)
-    return {**mover.state(posed).scene(), "error": wrong, "beyond": outside(posed.real.twin, posed.real.q)}
+    wrong = nothing(unit_of(mover.setup), "no leg is watched") if request.blind else error(mover.setup, posed.real)
+    return {**mover.state(posed).scene(), "error": wrong, "beyond": outside(posed.real.model, posed.real.q)}

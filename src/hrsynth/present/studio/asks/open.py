@@ -50,21 +50,21 @@ def answer(request: Request) -> dict[str, Any]:
 
 def scene(request: Request) -> dict[str, Any]:
     """What is drawn and moved."""
-    setting, mover = request.setting, request.mover()
-    known = {each.leg: each for each in (*setting.segments, *setting.observed)}
-    shapes, missing = meshes(setting, request.fence)
+    setup, mover = request.setup, request.mover()
+    known = {each.leg: each for each in (*setup.segments, *setup.observed)}
+    shapes, missing = meshes(setup, request.fence)
     places = [mover.places(each)[REAL] for each in (mover.home, *(end for pair in request.ends for end in pair))]
-    words = str(setting.anatomy.architecture())
-    machine = machine_of(REAL, setting, setting.mechanism, words, places, shapes)
+    words = str(setup.decomposition.architecture())
+    machine = machine_of(REAL, setup, setup.mechanism, words, places, shapes)
     here = request.here(mover)
     return {
-        **stage(setting, [machine], arrows_of(setting, known.values())),
-        "words": f"{words}, {setting.dof} freedom{'s' * (setting.dof != 1)}",
-        "legs": [_leg(request, setting, leg) for leg in setting.anatomy.legs],
+        **stage(setup, [machine], arrows_of(setup, known.values())),
+        "words": f"{words}, {setup.dof} freedom{'s' * (setup.dof != 1)}",
+        "legs": [_leg(request, setup, leg) for leg in setup.decomposition.legs],
         "sliders": sliders(mover, request.ends),
-        "scale": scale(unit_of(setting)),
+        "scale": scale(unit_of(setup)),
         **describe_pose(request, mover, here),
-        "notes": [*map(str, setting.robot.notes), *setting.beside(), *missing],
+        "notes": [*map(str, setup.robot.notes), *setup.beside(), *missing],
         **lines(request, "derive"),
     }
 
@@ -90,21 +90,21 @@ def sliders(mover: Mover, ends: Sequence[tuple[Posed, Posed]]) -> list[dict[str,
     return made
 
 
-def _leg(request: Request, setting: ObservedRobot, leg: Leg) -> dict[str, Any]:
+def _leg(request: Request, setup: ObservedRobot, leg: Leg) -> dict[str, Any]:
     """A leg: its chain, whether it can be watched, and why at this link, or why not; what to ``ask`` for it by."""
-    seen = next((each for each in setting.observed if each.leg == leg.label), None)
-    default = next((each for each in setting.segments if each.leg == leg.label), None)
+    seen = next((each for each in setup.observed if each.leg == leg.label), None)
+    default = next((each for each in setup.segments if each.leg == leg.label), None)
     shown, why = seen or default, None
     if shown is None:
         try:
-            shown = default_observation(setting.anatomy, leg)
+            shown = default_observation(setup.decomposition, leg)
         except NoSegment as error:
             why = str(error)
     if shown is not None:
-        why = reason(setting.anatomy, shown)
+        why = reason(setup.decomposition, shown)
     return {
         "name": leg.label,
-        "words": str(setting.anatomy.word(leg)),
+        "words": str(setup.decomposition.word(leg)),
         "can": shown is not None,
         "why": why,
         "watched": seen is not None and not request.blind,

@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 
 from ....analysis.accuracy.accuracy import sees_all
-from ....analysis.accuracy.cones import Blur
 from ....analysis.accuracy.error_map import Mapper
+from ....analysis.accuracy.measurement_bounds import MeasurementBounds
 from ....analysis.accuracy.pose_errors import largest_by_ascent
-from ....analysis.singularity.agreement import weakest
-from ....batch.reach import spread
+from ....analysis.singularity.condition_check import weakest
+from ....batch.pose_continuation import spread
 from ....budgets import FARTHEST_POSE, LARGEST_STUDIO_PLANE, LARGEST_STUDIO_SWEEP
 from ....errors import BadRequest
 from ....geometry.vectors import Array, nested_lists
 from ....kinematics.configuration import ClosedConfiguration
+from ....kinematics.continuation import track
 from ....kinematics.coordinates import Coordinates
-from ....kinematics.steps import track
 from ....mechanism.pose import SCALARS, Grid, Pose
 from ....results import Value
 from ....tolerances import ON_LOCUS, SAME_RELATION, SLIDER_ARRIVED
@@ -50,8 +50,8 @@ class PoseField(Value):
 
 def answer(request: Request) -> dict[str, Any]:
     """A plane of two coordinates, the others as at ``here``, the third at ``at``."""
-    setting, mover = request.seeing(), request.mover()
-    sees_all(setting)
+    setup, mover = request.seeing(), request.mover()
+    sees_all(setup)
     here = request.here(mover)
     kind = request.text("kind", (ACCURACY, DISTANCE)) or ACCURACY
     pair = _pair(mover, request.text("of"))
@@ -65,7 +65,7 @@ def answer(request: Request) -> dict[str, Any]:
         if not low - SLIDER_ARRIVED <= at <= high + SLIDER_ARRIVED:
             raise BadRequest("at", at, f"{low:.6g} to {high:.6g}")
         values[third[0]] = at
-    mapper, unit = Mapper(setting, Blur(np.full(len(setting.observed), CONE))), unit_of(setting)
+    mapper, unit = Mapper(setup, MeasurementBounds(np.full(len(setup.observed), CONE))), unit_of(setup)
     known = mapper.batch is not None and _at_batch(mover, here.real)
     cells = size if known else min(size, LARGEST_STUDIO_SWEEP)
     grid = together(mover, here.real, pair, values, ranges, cells)
@@ -74,7 +74,7 @@ def answer(request: Request) -> dict[str, Any]:
     else:
         found = one_by_one(mover, here.real, pair, values, ranges, cells, kind, unit)
     same = NONE
-    if grid is not None and (known or same_at(setting, here.real)):
+    if grid is not None and (known or same_at(setup, here.real)):
         text = grid_text(grid)
         same = (
             lines(request, "accuracy", cone=CONE_TEXT, grid=text)
@@ -94,7 +94,7 @@ def answer(request: Request) -> dict[str, Any]:
         "at": float(values[third[0]]) if third else None,
         "normal": np.eye(3)[across].tolist() if across is not None and across < 3 else None,
         "locus": [[place(*point).tolist() for point in segment] for segment in found.locus],
-        "words": _words(kind, unit, found, here.real.twin.length) + ("" if grid is not None and known else SINGLY),
+        "words": _words(kind, unit, found, here.real.model.length) + ("" if grid is not None and known else SINGLY),
         "of": [mover.coordinates.names[i] for i in pair],
         **same,
     }
@@ -121,18 +121,18 @@ def _pair(mover: Mover, said: str | None) -> tuple[int, int]:
 
 def _at_batch(mover: Mover, at: ClosedConfiguration) -> bool:
     """Whether a configuration is the one that closed forms give at its pose."""
-    placer = mover.setting.placer
+    placer = mover.setup.placer
     if placer is None:
         return False
-    (found,) = placer.configurations(at.pose(mover.setting.motion.link)[None])
-    return found is not None and float(np.linalg.norm(at.twin.difference(found.q, at.q))) < SAME_RELATION
+    (found,) = placer.configurations(at.pose(mover.setup.motion.link)[None])
+    return found is not None and float(np.linalg.norm(at.model.difference(found.q, at.q))) < SAME_RELATION
 
 
 def together(
     mover: Mover, here: ClosedConfiguration, pair: tuple[int, int], values: Array, ranges: list[Array], size: int
 ) -> Grid | None:
     """The plane as a grid of poses, None where the parts of a pose do not say it."""
-    names, motion = mover.coordinates.names, mover.setting.motion
+    names, motion = mover.coordinates.names, mover.setup.motion
     turns = [i for i, name in enumerate(names) if name not in SCALARS]
     if turns and (
         set(turns) & set(pair)
@@ -183,7 +183,7 @@ def one_by_one(
     unit: str,
 ) -> PoseField:
     """The plane pose by pose, each led to from a neighbour, in the working mode of ``here``."""
-    setting, motion, question = mover.setting, mover.setting.motion, mover.setting.samples.question
+    setup, motion, question = mover.setup, mover.setup.motion, mover.setup.samples.observation_model
     aims = []
     axes = [np.linspace(ends[0], ends[1], size) for ends in ranges]
     for point in np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 2):
@@ -195,7 +195,7 @@ def one_by_one(
         there, came = track(origin, motion, aims[cell], halvings)
         return there if came == 1 else None
 
-    blur = Blur(np.full(len(setting.observed), CONE))
+    blur = MeasurementBounds(np.full(len(setup.observed), CONE))
     found = np.full((2, len(aims)), np.nan)
     for i, at in enumerate(spread(here, (size, size), aims, lead)):
         if at is not None:
@@ -225,7 +225,7 @@ def _crossings(x: Array, y: Array, values: Array) -> Iterator[Array]:
 
 def _placer(mover: Mover, pair: tuple[int, int], values: Array) -> Callable[[float, float], Array]:
     """Where a point of the plane is drawn: a turn along its axis, one radian as long as the robot's length."""
-    motion, length = mover.setting.motion, mover.home.real.twin.length
+    motion, length = mover.setup.motion, mover.home.real.model.length
     ways, origin = np.eye(6, 3), motion.position(mover.home.real.pose(motion.link))
     ways[3:] = length * np.eye(3)
     if motion.rotations.shape[1] == 1:

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from ....analysis.modes.motions import follow_motion
-from ....analysis.posture import ConfigurationAnalysis
+from ....analysis.configuration_report import ConfigurationAnalysis
+from ....analysis.modes.self_motions import follow_motion
 from ....budgets import LARGEST_STUDIO_LIST
 from ....errors import BadRequest
-from ....kinematics.relation import Measurement
-from ....kinematics.tasks import Held, system
+from ....kinematics.tasks import FixedValuesTask, system
+from ....kinematics.velocity_relation import ObservationModel
 from ...view.states import Posed
 from ..request import Request
 from .move import state
@@ -24,12 +24,12 @@ def answer(request: Request) -> dict[str, Any]:
     """The motion of the lost freedom number ``lost`` at ``here``, as ``watch`` lists them; no more than where it is
     where the directions stay to first order only."""
     number = request.count("lost", 0, LARGEST_STUDIO_LIST)
-    setting, mover = request.seeing(), request.mover(request.flag("hidden"))
+    setup, mover = request.seeing(), request.mover(request.flag("hidden"))
     here = request.here(mover)
-    lost = ConfigurationAnalysis.of(setting).examine(here.real).hidden.lost
+    lost = ConfigurationAnalysis.of(setup).examine(here.real).hidden.unobserved
     if number is None or number >= len(lost):
         raise BadRequest("number of a lost freedom", number, f"0 to {len(lost) - 1}" if lost else "none is lost here")
-    question = setting.samples.question
+    question = setup.samples.observation_model
     ways = [
         mover.follow_hidden(here, way)
         for way in follow_motion(here.real, question, lost[number].twist[: question.twist_rows], STEPS)
@@ -49,10 +49,10 @@ def _there_and_back(way: list[Posed]) -> list[Posed]:
     return [*way, *reversed(way[:-1])]
 
 
-def _words(name: str, question: Measurement, here: Posed, way: list[Posed]) -> str:
+def _words(name: str, question: ObservationModel, here: Posed, way: list[Posed]) -> str:
     """What is played, and how well the directions stay."""
     if not way:
         return f"{name}: no motion along it was found, the watched directions stay to first order only"
-    held = Held.at(here.real.twin, here.real.q, question.reference, question.observations)
-    worst = max(float(np.linalg.norm(system(each.real.twin, each.real.q, held)[0])) for each in way)
+    held = FixedValuesTask.at(here.real.model, here.real.q, question.reference, question.observations)
+    worst = max(float(np.linalg.norm(system(each.real.model, each.real.q, held)[0])) for each in way)
     return f"{name}: the watched directions stay, loops and directions to {worst:.0e}"

@@ -25,12 +25,12 @@ Poses = Callable[[str], Array]
 
 def answer(request: Request) -> dict[str, Any]:
     """The run from ``here`` to ``end``, a configuration told as ``here`` is, or to the coordinates ``goal``."""
-    setting, mover = request.seeing(), request.mover(request.flag("hidden"))
+    setup, mover = request.seeing(), request.mover(request.flag("hidden"))
     start = request.here(mover)
     end = _send_to(request, mover, start) if request.fields.get("end") is None else request.here(mover, "end")
-    task = ServoTask.between(setting, start.real, end.real)
+    task = ServoTask.between(setup, start.real, end.real)
     found = task.run()
-    reference, rods = setting.mechanism.reference, cylinders(setting.mechanism, setting.observed)
+    reference, rods = setup.mechanism.reference, cylinders(setup.mechanism, setup.observed)
     eye = place_camera(rods, reference, (start.real.pose, end.real.pose))
     last = len(found.run.times) - 1
     chosen = sorted({round(last * part) for part in np.linspace(0, 1, FRAMES)})
@@ -45,15 +45,15 @@ def answer(request: Request) -> dict[str, Any]:
         }
         for i, posed in zip(chosen, way, strict=False)
     ]
-    poses = [at_pose(setting, each.real) for each in (start, end)]
+    poses = [at_pose(setup, each.real) for each in (start, end)]
     same = lines(request, "servo", start=poses[0], goal=poses[1])
     return {
         "frames": frames,
         "desired": image(eye, reference, rods, end.real.pose),
         "size": [eye.width, eye.height],
-        "kind": found.ended,
-        "words": f"Ended in: {found.ended} ({found.ending.reason}), after {found.run.times[-1]:.3g} s",
-        **(same if same_at(setting, start.real, end.real) else NONE),
+        "kind": found.outcome,
+        "words": f"Ended in: {found.outcome} ({found.run_outcome.reason}), after {found.run.times[-1]:.3g} s",
+        **(same if same_at(setup, start.real, end.real) else NONE),
     }
 
 

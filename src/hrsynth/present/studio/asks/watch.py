@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from ....analysis.accuracy.cones import Blur
+from ....analysis.accuracy.measurement_bounds import MeasurementBounds
 from ....analysis.accuracy.pose_errors import error_axes
+from ....analysis.configuration_report import ConfigurationAnalysis
 from ....analysis.freedoms import Freedom
 from ....analysis.measured import MeasuredRobot
 from ....analysis.observed import ObservedRobot, restrict_samples
-from ....analysis.posture import ConfigurationAnalysis
 from ....analysis.verdict import CONTROLLABLE, Verdict, verdict_of
 from ....budgets import REMEMBERED
 from ....constraints.condition import always
@@ -37,8 +37,8 @@ MOST_SETS = 10
 
 def answer(request: Request) -> dict[str, Any]:
     """All that follows from which legs are watched, at ``here``."""
-    setting = request.setting
-    best = [each for each in smallest(all_legs(setting)) if each.rank]
+    setup = request.setup
+    best = [each for each in smallest(all_legs(setup)) if each.rank]
     sets = {
         "sets": [{"legs": list(each.legs), "words": words(each)} for each in best[:MOST_SETS]],
         "more_sets": max(0, len(best) - MOST_SETS),
@@ -47,20 +47,20 @@ def answer(request: Request) -> dict[str, Any]:
         return {
             "verdict": {"controllable": False, "words": "no leg is watched", "certainty": ""},
             "rank": 0,
-            "dof": setting.dof,
+            "dof": setup.dof,
             "lost": [],
             "hidden": None,
             "hidden_words": "",
             "condition": "",
             **sets,
             "ellipsoid": None,
-            "error": nothing(unit_of(setting), "no leg is watched"),
+            "error": nothing(unit_of(setup), "no leg is watched"),
             **lines(request, "legs"),
         }
     derivation, mover = request.derivation, request.mover()
     verdict, here = derivation.verdict, request.here(mover)
-    posture = ConfigurationAnalysis.of(setting).examine(here.real)
-    point = setting.motion.position(here.real.pose(setting.motion.link))
+    posture = ConfigurationAnalysis.of(setup).examine(here.real)
+    point = setup.motion.position(here.real.pose(setup.motion.link))
     return {
         "verdict": {
             "controllable": verdict == CONTROLLABLE,
@@ -70,13 +70,13 @@ def answer(request: Request) -> dict[str, Any]:
         "rank": posture.hidden.rank,
         "dof": verdict.dof,
         "here": STATES[posture.hidden.state],
-        "lost": [describe_lost(each, point.tolist()) for each in posture.hidden.lost],
+        "lost": [describe_lost(each, point.tolist()) for each in posture.hidden.unobserved],
         "hidden": hidden_machine(request),
         "hidden_words": hidden_words(request),
-        "condition": condition(setting),
+        "condition": condition(setup),
         **sets,
-        "ellipsoid": ellipsoid(setting, here.real),
-        "error": error(setting, here.real),
+        "ellipsoid": ellipsoid(setup, here.real),
+        "error": error(setup, here.real),
         **lines(request, "derive"),
     }
 
@@ -105,7 +105,7 @@ def hidden_machine(request: Request) -> dict[str, Any] | None:
     mover = request.mover(hidden=True)
     posed = [mover.home, *(mover.with_hidden(end.real) for pair in request.ends for end in pair)]
     places = [mover.places(each)[HIDDEN] for each in posed if each.hidden is not None]
-    return machine_of(HIDDEN, request.setting, found.hidden, str(found.hidden_architecture), places, ()).scene()
+    return machine_of(HIDDEN, request.setup, found.hidden, str(found.hidden_architecture), places, ()).scene()
 
 
 def hidden_words(request: Request) -> str:
@@ -113,54 +113,54 @@ def hidden_words(request: Request) -> str:
     found = request.derivation
     legs = found.hidden_architecture
     return (
-        f"{legs}; certificate {certificate(found.certificate)}"
+        f"{legs}; certificate {certificate(found.equivalence)}"
         if legs
         else "none: every observed direction is constant"
     )
 
 
-def condition(setting: ObservedRobot) -> str:
+def condition(setup: ObservedRobot) -> str:
     """When a freedom is lost that is seen generically (Type 2)."""
-    robot = MeasuredRobot.of_directions(setting)
+    robot = MeasuredRobot.of_directions(setup)
     try:
-        if robot.verdict.lost:
+        if robot.verdict.unobserved:
             return always(robot.pattern, robot.verdict.never)
         return robot.condition.words
     except HrsynthError as problem:
         return str(problem)
 
 
-def all_legs(setting: ObservedRobot) -> ObservedRobot:
+def all_legs(setup: ObservedRobot) -> ObservedRobot:
     """The same robot with all legs watched."""
-    return ObservedRobot.of(setting.robot, "all")
+    return ObservedRobot.of(setup.robot, "all")
 
 
 @lru_cache(maxsize=REMEMBERED)
-def smallest(setting: ObservedRobot) -> tuple[Verdict, ...]:
+def smallest(setup: ObservedRobot) -> tuple[Verdict, ...]:
     """The verdicts of the smallest sets of watched legs that see as much as all of them: those of ``hrsynth legs``, of
     which larger ones are left out."""
-    labels = labels_of(setting.observed)
-    best = verdict_of(setting, labels, setting.samples).rank
+    labels = labels_of(setup.observed)
+    best = verdict_of(setup, labels, setup.samples).rank
     for size in range(1, len(labels) + 1):
         found = []
         for chosen in combinations(labels, size):
             samples = restrict_samples(
-                setting.everything, [each for each in setting.observed if each.leg in chosen], ways=False
+                setup.all_samples, [each for each in setup.observed if each.leg in chosen], ways=False
             )
             if max(member.relation.rank for member in samples.members) == best:
                 with suppress(RankUndecided):
-                    found.append(verdict_of(setting, chosen, samples))
+                    found.append(verdict_of(setup, chosen, samples))
         if found:
             return tuple(found)
     return ()
 
 
-def ellipsoid(setting: ObservedRobot, at: ClosedConfiguration) -> dict[str, Any] | None:
+def ellipsoid(setup: ObservedRobot, at: ClosedConfiguration) -> dict[str, Any] | None:
     """The ellipsoid that stands for the position errors for 0.1° of each direction (:func:`.error_axes`); None where
     they have no bound, or there are none."""
-    if not all(isinstance(each, Direction) for each in setting.observed):
+    if not all(isinstance(each, Direction) for each in setup.observed):
         return None
-    axes = error_axes(at, setting.samples.question, Blur(np.full(len(setting.observed), CONE)))
+    axes = error_axes(at, setup.samples.observation_model, MeasurementBounds(np.full(len(setup.observed), CONE)))
     if axes is None or not axes.any():
         return None
-    return {"center": setting.motion.position(at.pose(setting.motion.link)).tolist(), "axes": axes.tolist()}
+    return {"center": setup.motion.position(at.pose(setup.motion.link)).tolist(), "axes": axes.tolist()}

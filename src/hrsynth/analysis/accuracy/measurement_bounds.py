@@ -1,0 +1,268 @@
+"""By how much what is observed may be wrong: half-angles of cones as a user writes them, one for all directions or one
+a leg, and amounts of noise for each kind of observation.
+
+To first order the errors of an observation are the images of unit balls: a cone is one ball, an image point a disc, an
+ellipse that is found by five of its points two balls.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from numbers import Real
+from typing import Any
+
+import numpy as np
+
+from ...errors import BadRequest
+from ...geometry.vectors import Array, rotation_about
+from ...kinematics.configuration import ClosedConfiguration, measure
+from ...kinematics.velocity_relation import ObservationModel
+from ...mechanism import Observation
+from ...mechanism.noise import Noise, blurs
+from ...mechanism.observations.direction import SeenAxis
+from ...options import plain_number
+from ...results import Value
+from ...tolerances import NARROWEST_CONE, SEEN_ABOVE
+
+ANGLES = "0.1deg, 0.002 (radians)"
+EXAMPLE = f"{ANGLES}, or one for each leg such as 1=0.1deg,2=0.2deg"
+ALLOWED = "more than 0 and less than 90deg"
+
+Cones = float | str | Mapping[str, float | str] | Mapping[int, float | str]
+"""One half-angle (rad) for all observed directions, one for each leg or link, or either as text."""
+
+
+def half_angles(cones: Cones, observed: Sequence[Observation]) -> Array:
+    """The half-angle (rad) of each observation's cone, (k,); raises ``BadRequest`` where one is missing, is of nothing
+    that is observed, or is not between 0 and 90 degrees."""
+    given = _parse(cones) if isinstance(cones, str) else cones
+    if not isinstance(given, Mapping):
+        return np.full(len(observed), _require_angle(given, given))
+    given = {str(name): _angle(value) if isinstance(value, str) else value for name, value in given.items()}
+    names = {name for o in observed for name in (o.leg, o.link)}
+    unknown = [name for name in given if name not in names]
+    if unknown:
+        raise BadRequest(
+            "a cone for something that is not observed",
+            unknown[0],
+            "legs " + ", ".join(dict.fromkeys(o.leg for o in observed)),
+        )
+    found = []
+    for o in observed:
+        value = given.get(o.link, given.get(o.leg))
+        if value is None:
+            raise BadRequest(f"leg {o.leg} has no cone", str(cones), EXAMPLE)
+        found.append(_require_angle(value, value))
+    return np.array(found)
+
+
+def _parse(text: str) -> float | dict[str, float]:
+    fields = [field.strip() for field in text.split(",")]
+    if len(fields) == 1 and "=" not in fields[0]:
+        return _angle(fields[0])
+    found: dict[str, float] = {}
+    for field in fields:
+        name, equals, value = (piece.strip() for piece in field.partition("="))
+        if not equals:
+            raise BadRequest("cones: not leg=angle", field, EXAMPLE)
+        if name in found:
+            raise BadRequest("cones: leg given twice", name, "once")
+        found[name] = _angle(value)
+    return found
+
+
+def single_angle(cone: float | str) -> float:
+    """One half-angle (rad) for all that is observed; raises ``BadRequest``."""
+    return _angle(cone, ANGLES) if isinstance(cone, str) else _require_angle(cone, cone)
+
+
+def _angle(text: str, allowed: str = EXAMPLE) -> float:
+    digits = text.removesuffix("deg").strip()
+    try:
+        value = plain_number(digits)
+    except ValueError:
+        raise BadRequest("cone: not a number", text, allowed) from None
+    return _require_angle(value if digits == text else math.radians(value), text)
+
+
+def _require_angle(value: Any, shown: object) -> float:
+    if isinstance(value, bool) or not (isinstance(value, Real) and 0 < float(value) < math.pi / 2):
+        raise BadRequest("half-angle of a cone", shown, ALLOWED)
+    if value < NARROWEST_CONE:
+        raise BadRequest("half-angle of a cone", shown, f"at least {NARROWEST_CONE:g} (radians)")
+    return float(value)
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorBalls:
+    """The first-order errors of what is observed at a configuration: for each ball the place of its observation, its
+    number among the observation's own, and the map (rows, 3) of it to all that is fed back (characteristic lengths).
+    Of directions ``fed`` is the value itself, else the error of a servo loop: rates (rows, n) come from those of values
+    by the ``slopes``, None where all are 1."""
+
+    balls: tuple[tuple[int, int], ...]
+    maps: tuple[Array, ...]
+    slopes: tuple[Array, ...] | None
+
+    def rows(self, rates: Array) -> Array:
+        """The rates (rows, n) of what is fed back, of those of the values."""
+        if self.slopes is None:
+            return rates
+        places = np.cumsum([0, *(slope.shape[1] for slope in self.slopes)])
+        return np.vstack([slope @ rates[a:b] for slope, a, b in zip(self.slopes, places, places[1:], strict=False)])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MeasurementBounds(Value):
+    """By how much each observation may be wrong: the half-angle (rad) of the cone about each direction, (k,), zero for
+    what is no direction; ``amounts`` of noise by their units for those."""
+
+    cones: Array
+    noise: Noise | None = None
+
+    @classmethod
+    def of(cls, cone: Cones | None, noise: str | Noise | None, observed: Sequence[Observation]) -> MeasurementBounds:
+        """What a user says; raises ``BadRequest`` where nothing is said of a direction, or of anything else."""
+        amounts = Noise.read(noise)
+        axes = [o for o in observed if isinstance(o, SeenAxis)]
+        others = [o for o in observed if not isinstance(o, SeenAxis)]
+        if cone is None and amounts is None:
+            raise BadRequest(
+                "how wrong the observations may be is not given",
+                None,
+                "a cone about each direction, as --cone 0.1deg, or errors of what else is observed, as "
+                "--noise 0.1deg,0.3px,1mm",
+            )
+        if cone is not None and not axes:
+            raise BadRequest("cones apply to directions only", ", ".join(o.leg for o in observed), "--noise")
+        if others and amounts is None:
+            raise BadRequest(
+                f"cones apply to directions only, not to {others[0].kind} {others[0].leg}",
+                str(cone),
+                "noise besides, as 0.3px or 1mm: --noise",
+            )
+        if amounts is not None:
+            amounts.amounts_for(others if cone is not None else observed)
+        angle = 0.0 if amounts is None else amounts.of("rad")
+        half = half_angles(cone, axes) if cone is not None else np.full(len(axes), angle)
+        found = np.zeros(len(observed))
+        found[[i for i, o in enumerate(observed) if isinstance(o, SeenAxis)]] = half
+        return cls(found, amounts if others else None)
+
+    @property
+    def amounts(self) -> dict[str, float]:
+        """The noise by its units."""
+        return {} if self.noise is None else dict(self.noise.amounts)
+
+    def own(self, place: int, seen: Observation) -> dict[str, float]:
+        """The noise that one observation has; of a direction that is its cone."""
+        if isinstance(seen, SeenAxis):
+            return {"rad": float(self.cones[place])} if self.cones[place] else {}
+        own = {unit: amount for unit, amount in self.amounts.items() if unit in seen.found_by}
+        return {"px": own["px"]} if "px" in own else own
+
+    @property
+    def each(self) -> str:
+        """The word for the set in which one error lies."""
+        return "cone" if self.noise is None else "error"
+
+    @property
+    def inside(self) -> str:
+        """Of what, and within what, all errors are considered."""
+        return "of the directions inside their cones" if self.noise is None else "that the noise allows"
+
+    def words(self, place: int, seen: Observation) -> str:
+        """How wrong one of the observations may be."""
+        if isinstance(seen, SeenAxis):
+            return f"within {np.degrees(self.cones[place]):.4g}°" if self.cones[place] else "exact"
+        own = self.own(place, seen)
+        return f"within {' and '.join(str(Noise(((unit, own[unit]),))) for unit in own)}" if own else "exact"
+
+    def select(self, places: Sequence[int]) -> MeasurementBounds:
+        """That of some of the observations."""
+        return MeasurementBounds(self.cones[list(places)], self.noise)
+
+    def exact(self, observed: Sequence[Observation]) -> tuple[str, ...]:
+        """What has no error at all."""
+        return tuple(o.leg for i, o in enumerate(observed) if not self.own(i, o))
+
+    def at(self, at: ClosedConfiguration, observation_model: ObservationModel) -> ErrorBalls:
+        """The errors at a configuration."""
+        every = observation_model.observations
+        balls: list[tuple[int, int]] = []
+        maps: list[Array] = []
+        if all(isinstance(o, SeenAxis) for o in every):
+            for i, cone in enumerate(self.cones):
+                balls.append((i, 0))
+                maps.append(np.kron(np.eye(len(every))[:, i : i + 1], cone * np.eye(3)))
+            return ErrorBalls(tuple(balls), tuple(maps), None)
+        values = measure(at.model, at.q, observation_model.reference, every)[2]
+        slopes = tuple(o.error_slope(value, value) for o, value in zip(every, values, strict=True))
+        ends = np.cumsum([0, *(len(slope) for slope in slopes)])
+        for i, (o, value) in enumerate(zip(every, values, strict=True)):
+            unit = at.model.length ** np.broadcast_to(o.dimension, o.size)
+            own = (
+                [self.cones[i] * np.eye(3)]
+                if isinstance(o, SeenAxis)
+                else [each / unit[:, None] for each in blurs(o, value * unit, self.own(i, o))]
+            )
+            for number, each in enumerate(own):
+                whole = np.zeros((ends[-1], 3))
+                whole[ends[i] : ends[i + 1]] = slopes[i] @ each
+                if whole.any():
+                    balls.append((i, number))
+                    maps.append(whole)
+        return ErrorBalls(tuple(balls), tuple(maps), slopes)
+
+    def radii(self, balls: Sequence[tuple[int, int]]) -> Array:
+        """In what unit vectors of balls are told: cones in radians, others as parts of the ball."""
+        return np.array([self.cones[i] or 1.0 for i, _ in balls])
+
+    def wrong(
+        self,
+        observed: Sequence[Observation],
+        values: Sequence[Array],
+        length: float,
+        balls: ErrorBalls,
+        way: Array,
+        part: float,
+    ) -> list[Array]:
+        """What is measured where values are off by a part of a ``way`` (balls, 3), told by :meth:`radii`."""
+        found = list(values)
+        shocks = np.zeros((len(observed), 2, 3))
+        for (i, number), each in zip(balls.balls, way, strict=True):
+            shocks[i, number] = part * each
+        for i, (o, value) in enumerate(zip(observed, values, strict=True)):
+            if isinstance(o, SeenAxis):
+                found[i] = tilt(value[None], shocks[i, :1])[0]
+            elif own := self.own(i, o):
+                unit = length ** np.broadcast_to(o.dimension, o.size)
+                found[i] = o.sense(value * unit, shocks[i], own) / unit
+        return found
+
+
+def tilt(u: Sequence[Array] | Array, way: Array) -> Array:
+    """u (k, 3), each turned by the angle ‖way‖ towards its way (k, 3), which is normal to it."""
+    return np.array(
+        [
+            rotation_about(np.cross(a, b), float(np.linalg.norm(b))) @ a if np.any(b) else a
+            for a, b in zip(u, way, strict=True)
+        ]
+    )
+
+
+IN_SIGHT = "a pose from which all is seen, or a camera whose z axis points at it"
+
+
+def unseen(at: ClosedConfiguration, observation_model: ObservationModel) -> Observation | None:
+    """What is not in front of its camera, or not in its picture, at a configuration."""
+    return next(
+        (
+            o
+            for o in observation_model.observations
+            if o.in_front(at.pose(o.seen_from or observation_model.reference), at.pose(o.link)) < SEEN_ABOVE
+        ),
+        None,
+    )

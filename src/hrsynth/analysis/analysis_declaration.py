@@ -1,0 +1,171 @@
+"""What all questions share: robots by value, name or path; old names of options; answers that are remembered."""
+
+from __future__ import annotations
+
+import warnings
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import dataclass
+from functools import wraps
+from inspect import signature
+from numbers import Integral, Real
+from threading import Lock
+from typing import Any, ParamSpec, TypeVar
+
+import numpy as np
+
+from ..budgets import REMEMBERED_ANSWERS, REMEMBERED_GRIDS
+from ..errors import BadRequest, MissingExtra
+from ..mechanism import Mechanism
+from ..options import Option, kinds_of, options_of, plain_signature, require_range
+from ..results import content, require_keywords
+from .observed import as_robot, forget_robots, legs_asked
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+KINDS: dict[str, tuple[Any, str]] = {
+    "int": (Integral, "an integer"),
+    "float": (Real, "a number"),
+    "str": (str, "a text"),
+    "bool": ((bool, np.bool_), "True or False"),
+}
+"""What an argument must be whose type is one of these, and in words."""
+
+
+@dataclass(frozen=True)
+class Declaration:
+    """What is said once of an analysis: its ``place`` in lists, what it answers in one line, its options, examples of
+    its command line, whether it takes a ``seed`` there."""
+
+    place: int
+    help: str
+    options: tuple[Option, ...]
+    examples: tuple[str, ...]
+    seeded: bool
+
+
+class AnswerMemory:
+    """The answers that were asked for last, at most so many."""
+
+    def __init__(self, most: int) -> None:
+        self.most, self.lock = most, Lock()
+        self.kept: OrderedDict[Hashable, Any] = OrderedDict()
+
+    def answer(self, key: Hashable, ask: Callable[[], Any]) -> Any:
+        """What was answered before, or is now; not kept where an optional package was missing, which may come."""
+        with self.lock:
+            if key in self.kept:
+                self.kept.move_to_end(key)
+                return self.kept[key]
+        missed = MissingExtra.met
+        found = ask()
+        if MissingExtra.met == missed:
+            with self.lock:
+                self.kept[key] = found
+                while len(self.kept) > self.most:
+                    self.kept.popitem(last=False)
+        return found
+
+
+_ANSWERS, _GRIDS = AnswerMemory(REMEMBERED_ANSWERS), AnswerMemory(REMEMBERED_GRIDS)
+
+
+def clear_cache() -> None:
+    """Clear all answers and samples from the cache.
+
+    >>> hrsynth.clear_cache()
+    """
+    forget_answers()
+    forget_robots()
+
+
+def forget_answers() -> None:
+    """Forget the answers alone."""
+    for memory in (_ANSWERS, _GRIDS):
+        memory.kept.clear()
+
+
+def require_kinds(kinds: Mapping[str, list[str]], options: Mapping[str, Option], given: Mapping[str, Any]) -> None:
+    """Raise ``BadRequest`` for an argument that is no number, text or truth value where the signature asks for one, or
+    a number out of its range."""
+    for name, value in given.items():
+        option = options.get(name)
+        kind, *none = kinds[name]
+        if kind not in KINDS or none not in ([], ["None"]) or (none and value is None):
+            continue
+        right, word = KINDS[kind]
+        if not isinstance(value, right) or (isinstance(value, bool) and kind != "bool"):
+            raise BadRequest(name, value, word)
+        if option is not None:
+            require_range(name, value, word, option.low, option.high)
+
+
+def analysis(
+    place: int, *, examples: tuple[str, ...], seeded: bool = True, formations: bool = False, **old: str
+) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """A function of a robot whose answers are frozen values: the robot is also taken by its name or path, and what was
+    asked before is not computed again. ``old`` names of options, each with the one that it has now, are taken for one
+    version more. ``formations``: whether it can be asked of several bodies; else these are refused.
+
+    Everything else that is said of it is its :class:`Declaration`: its options stand in the annotations of its
+    parameters, what it answers in the first lines of its docstring. The index of all analyses is made of these
+    (:mod:`hrsynth.index`).
+
+    The same question is one with equal arguments about an equal robot, read from the same file.
+    """
+
+    def made(function: Callable[P, R]) -> Callable[P, R]:
+        known = signature(function)
+        options = tuple(options_of(function))
+        kinds = kinds_of(function)
+        by_name = {each.name: each for each in options}
+        summary = " ".join((function.__doc__ or "").partition("\n\n")[0].split())
+
+        @wraps(function)
+        def asked(*args: Any, **given: Any) -> Any:
+            for name in sorted(old.keys() & given.keys()):
+                if old[name] in given:
+                    raise TypeError(f"{function.__name__}: {name} is the old name of {old[name]}, which is given too")
+                warnings.warn(
+                    f"{function.__name__}: {name} is now called {old[name]}; the old name will be "
+                    "removed in the next version",
+                    DeprecationWarning,
+                    stacklevel=2,
+                )
+                given[old[name]] = given.pop(name)
+            require_keywords(function, given)
+            try:
+                bound = known.bind(*args, **given)
+            except TypeError as error:
+                raise TypeError(f"{function.__name__}: {error}; it takes {', '.join(known.parameters)}") from None
+            require_kinds(kinds, by_name, bound.arguments)
+            robot = bound.arguments["robot"] = as_robot(bound.arguments["robot"])
+            source = robot if isinstance(robot, Mechanism) else robot.robot
+            if source.formation and not formations:
+                raise BadRequest(
+                    f"{source.name}: {function.__name__} is about one platform, and this is a formation",
+                    ", ".join(source.bodies),
+                    "a file with a <platform>, or derive, legs, check",
+                )
+            if any(given.get(name) is not None for name in ("seconds", "into")):
+                return function(*bound.args, **bound.kwargs)
+            every = known.bind(*args, **given)
+            every.apply_defaults()
+            if "observe" in every.arguments:
+                every.arguments["observe"] = legs_asked(robot, every.arguments["observe"], every.arguments.get("see"))
+            told = [(name, content(value)) for name, value in every.arguments.items() if name != "robot"]
+            key = (function.__qualname__, robot, source.file, source.notes, source.options, source.sha256, *told)
+            try:
+                hash(key)
+            except TypeError:
+                return function(*bound.args, **bound.kwargs)
+            large = any(given.get(name) is not None for name in ("plane", "grid"))
+            return (_GRIDS if large else _ANSWERS).answer(key, lambda: function(*bound.args, **bound.kwargs))
+
+        asked.__signature__ = plain_signature(function)  # type: ignore[attr-defined]
+        asked.declaration = Declaration(place, summary, options, examples, seeded)  # type: ignore[attr-defined]
+        return asked
+
+    return made

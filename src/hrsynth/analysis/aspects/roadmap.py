@@ -1,0 +1,368 @@
+"""Ways around singular loci and through legs' limits: the straight one where it is proved, else one over a road map,
+random poses on one side of the locus in several working modes, with roads between neighbours and
+crossings where a leg passes its limit; roads are proved when they are needed.
+
+Nearest neighbours by SciPy, shortest ways by NetworkX; a road that cannot be proved is taken off the map.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import combinations, pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...budgets import FIRST_INTERVALS, REGION_WIDER
+from ...geometry.so3 import exponential, logarithm
+from ...geometry.vectors import Array
+from ...progress import report
+from .condition_enclosure import ConditionEnclosure, PathSegment, Proof, prove
+from .path_segments import PathCoordinates, Place, StraightSegment, WorkingModeChange, mode_change, poses_between
+
+if TYPE_CHECKING:
+    import networkx as nx
+
+
+@dataclass(frozen=True, eq=False)
+class PoseRegion:
+    """Where poses are drawn: boxes of shifts along, and turns about, what the platform can do, around a pose."""
+
+    coordinates: PathCoordinates
+    centre: Place
+    shift: Array
+    turn: Array
+
+    @classmethod
+    def around(cls, coordinates: PathCoordinates, p: Array, R: Array) -> PoseRegion:
+        """The region that is wider than known poses (n, 3), (n, 3, 3), around the first."""
+        motion = coordinates.motion
+        shifts = (p - p[0]) @ motion.translations
+        turns = logarithm(R @ R[0].T) @ motion.rotations
+        middle = p[0] + motion.translations @ ((shifts.max(axis=0) + shifts.min(axis=0)) / 2)
+        exact = cls(coordinates, (middle, R[0]), np.ptp(shifts, axis=0) / 2, np.max(np.abs(turns), axis=0, initial=0.0))
+        return exact.wider(REGION_WIDER)
+
+    def wider(self, factor: float) -> PoseRegion:
+        """The region grown by a factor; no turn is longer than π."""
+        limit = np.pi / max(1.0, np.sqrt(len(self.turn)))
+        return replace(self, shift=factor * self.shift, turn=np.minimum(factor * self.turn, limit))
+
+    def draw(self, rng: np.random.Generator, count: int) -> tuple[Array, Array]:
+        """Random poses (count, 3), (count, 3, 3)."""
+        motion = self.coordinates.motion
+        p = self.centre[0] + (rng.uniform(-1, 1, (count, len(self.shift))) * self.shift) @ motion.translations.T
+        turns = (rng.uniform(-1, 1, (count, len(self.turn))) * self.turn) @ motion.rotations.T
+        return p, exponential(turns) @ self.centre[1]
+
+
+DRAWS = 30
+"""Random poses that are drawn for each that is added to a working mode, at most."""
+NEIGHBOURS = 8
+SHEETS = 16
+"""Working modes that are looked at together, at most."""
+CROSSINGS = 12
+"""Crossings that are added between two working modes in each round, at most."""
+HOP = 2.0
+"""Length that a mode_change counts for (characteristic lengths, radians)."""
+ROAD = 400
+"""Largest number of intervals for one road."""
+GLANCES = np.linspace(0, 1, 10)
+"""Places of a road that are looked at, in numbers, before it is put on the map."""
+
+Road = tuple[int, int]
+
+
+@dataclass(eq=False)
+class RoadMap:
+    """Poses, each in a working mode, and the roads between them: what is known of each, and proofs where tried.
+
+    The first pose is the start, the second the goal; ``enclosures`` are the condition in each working mode,
+    ``modes_of`` the places in it of each pose's own.
+    """
+
+    region: PoseRegion
+    enclosures: list[ConditionEnclosure]
+    places: list[Place]
+    modes_of: list[int]
+    budget: int
+    spent: int = 0
+    scale: float = 0.0
+    """A usual value of the condition."""
+    proofs: dict[Road, Proof] = field(default_factory=dict)
+    weights: dict[Road, float] = field(default_factory=dict)
+    """Lengths of roads, longer where the condition is weak; infinite where a road leaves reach or side."""
+    crossings: dict[Road, WorkingModeChange] = field(default_factory=dict)
+
+    @classmethod
+    def between(
+        cls,
+        enclosures: tuple[ConditionEnclosure, ConditionEnclosure],
+        region: PoseRegion,
+        start: Place,
+        goal: Place,
+        budget: int,
+    ) -> RoadMap:
+        """A map of two poses in their working modes."""
+        same = enclosures[0].forms.modes == enclosures[1].forms.modes
+        return cls(region, list(enclosures[: 1 if same else 2]), [start, goal], [0, 0 if same else 1], budget)
+
+    @property
+    def side(self) -> float:
+        """The sign of the condition's value at the start."""
+        (p, R), enclosure = self.places[0], self.enclosures[self.modes_of[0]]
+        return float(np.sign(enclosure.at(p[None], R[None])[1][0]))
+
+    def open(self, limbs: Sequence[int]) -> None:
+        """Add the working modes in which some of these limbs differ from the start's; where they are too many, those in
+        which the first of them differ."""
+        many = 2 ** len(limbs) > SHEETS
+        chosen = (
+            [limbs[:k] for k in range(len(limbs) + 1)]
+            if many
+            else [part for k in range(len(limbs) + 1) for part in combinations(limbs, k)]
+        )
+        known = {enclosure.forms.modes for enclosure in self.enclosures}
+        for part in chosen:
+            chart = self.enclosures[self.modes_of[0]].forms
+            for limb in part:
+                chart = chart.flipped(limb)
+            if chart.modes not in known:
+                self.enclosures.append(replace(self.enclosures[0], forms=chart))
+
+    def add(self, region: PoseRegion, rng: np.random.Generator, count: int) -> None:
+        """Up to ``count`` random poses in each working mode, reachable and on the side of the start, with crossings
+        where two working modes have a pose near a limb's limit."""
+        p, R = region.draw(rng, DRAWS * count)
+        reach_margins = self.enclosures[0].forms.at(p, R).reach_margins
+        kept = (reach_margins[:, : len(self.enclosures[0].forms.subchains)] > 0).all(axis=1)
+        p, R, reach_margins = p[kept], R[kept], reach_margins[kept]
+        if not len(p):
+            return
+        fits = [enclosure.at(p, R) for enclosure in self.enclosures]
+        beside = [reached & (np.sign(values) == self.side) for reached, values in fits]
+        self.scale = self.scale or float(np.median(np.abs([values for _, values in fits])))
+        for mode, fit in enumerate(beside):
+            for i in np.flatnonzero(fit)[:count]:
+                self._place((p[i], R[i]), mode)
+        for one, two, limb in self._adjacent():
+            near = np.flatnonzero(beside[one] & beside[two])
+            for i in near[np.argsort(reach_margins[near, limb], kind="stable")][:CROSSINGS]:
+                self._cross((p[i], R[i]), one, two, limb)
+
+    def _adjacent(self) -> Iterator[tuple[int, int, int]]:
+        """Working modes that differ in one limb, and that limb."""
+        modes = np.array([enclosure.forms.modes for enclosure in self.enclosures])
+        for one, two in combinations(range(len(modes)), 2):
+            apart = np.flatnonzero(modes[one] != modes[two])
+            if len(apart) == 1:
+                yield one, two, int(apart[0])
+
+    def _place(self, place: Place, mode: int) -> int:
+        self.places.append(place)
+        self.modes_of.append(mode)
+        return len(self.places) - 1
+
+    def _cross(self, place: Place, one: int, two: int, limb: int) -> None:
+        enclosure = self.enclosures[one]
+        ways = [
+            mode_change(self.region.coordinates, self.enclosures[mode].forms.subchains[limb], limb, place)
+            for mode in (one, two)
+        ]
+        if ways[0] is None or ways[1] is None:
+            return
+        weight = self._weights(np.array([HOP]), *enclosure.at(*ways[0].at(GLANCES)))[0]
+        if np.isfinite(weight):
+            here, there = self._place(place, one), self._place(place, two)
+            self.crossings |= {(here, there): ways[0], (there, here): ways[1]}
+            self.weights[here, there] = weight
+
+    def road(self, one: int, two: int) -> PathSegment:
+        """The way from a pose to another: straight, or through a limit."""
+        across = self.crossings.get((one, two))
+        return StraightSegment.between(self.places[one], self.places[two]) if across is None else across
+
+    def proof(self, one: int, two: int) -> Proof:
+        """The proof of a road, tried once."""
+        key = _key(one, two)
+        if key not in self.proofs:
+            allowed = min(ROAD, self.budget - self.spent)
+            self.proofs[key] = prove(self.enclosures[self.modes_of[key[0]]], self.road(*key), allowed)
+            self.spent += self.proofs[key].boxes + FIRST_INTERVALS
+        return self.proofs[key]
+
+    def graph(self) -> nx.Graph:
+        """Roads between neighbours that are open as far as numbers tell, and were not refused."""
+        import networkx as nx
+
+        modes_of = np.array(self.modes_of)
+        for mode in range(len(self.enclosures)):
+            self._survey(np.flatnonzero(modes_of == mode))
+        graph: nx.Graph = nx.Graph()
+        graph.add_nodes_from(range(len(modes_of)))
+        graph.add_weighted_edges_from(
+            (*road, weight)
+            for road, weight in self.weights.items()
+            if np.isfinite(weight) and (road not in self.proofs or self.proofs[road].proved)
+        )
+        return graph
+
+    def _survey(self, members: NDArray[np.int_]) -> None:
+        """Look at the roads between neighbours in one working mode."""
+        from scipy.spatial import cKDTree
+
+        if len(members) < 2:
+            return
+        p, R = self._at(members)
+        flat = np.hstack([p, R.reshape(-1, 9) / np.sqrt(2)])
+        around = cKDTree(flat).query(flat, k=min(NEIGHBOURS + 1, len(flat)))[1]
+        roads = {_key(int(members[i]), int(members[j])) for i, row in enumerate(around) for j in row if i != j}
+        self._look(sorted(roads - self.weights.keys()))
+
+    def _look(self, roads: Sequence[Road]) -> None:
+        """Find the weights of straight roads in one working mode, of numbers along them."""
+        if not roads:
+            return
+        one, two = np.array(roads).T
+        places, turns, sizes = poses_between(*self._at(one), *self._at(two), GLANCES)
+        reached, values = self.enclosures[self.modes_of[one[0]]].at(places.reshape(-1, 3), turns.reshape(-1, 3, 3))
+        found = self._weights(sizes, reached.reshape(len(roads), -1), values.reshape(len(roads), -1))
+        self.weights.update(zip(roads, map(float, found), strict=True))
+
+    def _weights(self, sizes: Array, reached: NDArray[np.bool_], values: Array) -> Array:
+        """The weights of roads of these lengths (n,), from reach and values along them (n, k)."""
+        open_ = np.atleast_2d(reached & (np.sign(values) == self.side)).all(axis=1)
+        weakest = np.min(np.abs(np.atleast_2d(values)), axis=1)
+        return np.where(open_, sizes * (weakest + self.scale) / weakest, np.inf)
+
+    def _at(self, members: NDArray[np.int_]) -> tuple[Array, Array]:
+        p, R = zip(*(self.places[i] for i in members), strict=True)
+        return np.array(p), np.array(R)
+
+    def way(self) -> list[int] | None:
+        """The shortest way from the first place to the second whose roads are all proved."""
+        import networkx as nx
+
+        graph = self.graph()
+        while self.spent < self.budget and nx.has_path(graph, 0, 1):
+            found = list(pairwise(map(int, nx.shortest_path(graph, 0, 1, weight="weight"))))
+            hardest = sorted(found, key=lambda road: -self.weights[_key(*road)])
+            refused = next((road for road in hardest if not self.proof(*road).proved), None)
+            if refused is None:
+                return [found[0][0], *(two for _, two in found)]
+            graph.remove_edge(*refused)
+        return None
+
+    def shortened(self, way: list[int]) -> list[int]:
+        """The way with places left out where the road past them is proved too."""
+        kept, here = [way[0]], 0
+        while here < len(way) - 1:
+            here = next(j for j in range(len(way) - 1, here, -1) if j == here + 1 or self._past(way[here : j + 1]))
+            kept.append(way[here])
+        return kept
+
+    def _past(self, part: Sequence[int]) -> bool:
+        """Whether the straight road from the first to the last of a part in one working mode is proved."""
+        if any(self.modes_of[i] != self.modes_of[part[0]] for i in part):
+            return False
+        road = _key(part[0], part[-1])
+        if road not in self.weights:
+            self._look([road])
+        return bool(np.isfinite(self.weights[road])) and self.proof(*road).proved
+
+    def nearest(self) -> list[int]:
+        """Over proved roads to a place in the goal's working mode, as near to it as they lead, then straight on; no
+        place where none is proved."""
+        import networkx as nx
+
+        graph: nx.Graph = nx.Graph([road for road, proof in self.proofs.items() if proof.proved])
+        graph.add_node(0)
+        reached = {
+            i: way
+            for i, way in nx.single_source_shortest_path(graph, 0).items()
+            if self.modes_of[i] == self.modes_of[1]
+        }
+        if not reached:
+            return []
+        here = np.array(list(reached))
+        goal = np.ones_like(here)
+        last = here[np.argmin(poses_between(*self._at(here), *self._at(goal), GLANCES)[2])]
+        return [int(i) for i in reached[int(last)]] + [1]
+
+
+def _key(one: int, two: int) -> Road:
+    return min(one, two), max(one, two)
+
+
+ROUNDS = ((60, 1.0), (240, 1.5), (960, 2.0))
+"""Poses that are added to the map in each round, and how much wider than at first their region is; of several working
+modes each has its part."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedPath:
+    """A way from start to goal: its parts with their proofs (all proved, or the last is not; none where nothing leads
+    to the goal's working mode), and intervals used."""
+
+    ways: tuple[PathSegment, ...]
+    proofs: tuple[Proof, ...]
+    boxes: int
+
+    @property
+    def proved(self) -> bool:
+        """Whether the whole way is proved."""
+        return bool(self.proofs) and all(proof.proved for proof in self.proofs)
+
+    @property
+    def margin(self) -> float:
+        """The smallest enclosed value along the way."""
+        return min(proof.margin for proof in self.proofs)
+
+
+def plan(
+    enclosures: tuple[ConditionEnclosure, ConditionEnclosure],
+    region: PoseRegion,
+    start: Place,
+    goal: Place,
+    *,
+    seed: int,
+    budget: int,
+) -> PlannedPath:
+    """A way between two places in the working modes of two enclosures, with at most ``budget`` intervals.
+
+    In the first round only those limbs pass their limits that differ; then any that can.
+    """
+    roads = RoadMap.between(enclosures, region, start, goal, budget)
+    straight = roads.modes_of[1] == 0 and roads.proof(0, 1).proved
+    if straight:
+        return _plan(roads, [0, 1])
+    rng = np.random.default_rng(seed)
+    limbs = enclosures[0].forms.subchains
+    crossed = [
+        number
+        for number, (limb, other) in enumerate(zip(limbs, enclosures[1].forms.subchains, strict=True))
+        if limb.mode != other.mode
+    ]
+    able = [
+        number for number, limb in enumerate(limbs) if mode_change(region.coordinates, limb, number, start) is not None
+    ]
+    if not set(crossed) <= set(able):
+        return PlannedPath((), (), roads.spent)
+    for size, factor in ROUNDS:
+        if roads.spent >= budget:
+            break
+        report("road map")
+        roads.open(crossed)
+        roads.add(region.wider(factor), rng, int(np.ceil(size / np.sqrt(len(roads.enclosures)))))
+        found = roads.way()
+        if found is not None:
+            return _plan(roads, roads.shortened(found))
+        crossed = [int(i) for i in rng.permutation(crossed)] + [i for i in able if i not in crossed]
+    return _plan(roads, roads.nearest())
+
+
+def _plan(roads: RoadMap, way: list[int]) -> PlannedPath:
+    proofs = tuple(roads.proof(*road) for road in pairwise(way))
+    return PlannedPath(tuple(roads.road(*road) for road in pairwise(way)), proofs, roads.spent)

@@ -1,0 +1,356 @@
+"""The poses at which one leg of three cranks has its watched direction: a surface that holds all modes, the curve of
+Type 2 singularities on it, and its image among the other two directions, with cusps and nodes (theory.md, section 9).
+
+Cranks w_k about A_k carry rods e_k to the corners T_k = A_k + w_k + e_k = T₀ + r_k, r_k = b_k exp(iφ), k = 0, 1, 2;
+e₀ is held. With n_k = w₀ × w_k and m_k = r_k × w_k the lines through T_k along w_k meet, or are parallel, where
+
+    f = m₂ n₁ − m₁ n₂ = 0.
+
+There the platform can move while all e_k rest: with v = t i w₀, (t, ω) = (m_k, −n_k), ẇ₀ = v, ṙ_k = ω i r_k and
+ẇ_k = v + ṙ_k. Let g be the rate of f in this motion. At a regular zero of (f, g) with (t, ω) ≠ 0 the map from the
+surface to the directions of e₁, e₂ has a *cusp* (Whitney): three modes meet, and on a way around it two of them change
+places without a singularity. At a *node* two places of the curve have the same directions. Both are regular zeros of
+polynomial systems in the components of w_k and exp(iφ).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import product
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...budgets import SECTION_APART, SECTION_ITERATIONS, SECTION_PLACES, SECTION_STEP, SECTION_STEPS
+from ...geometry.balls import around, jets
+from ...geometry.vectors import Array
+from ...records import As, Record, Recorded, Shown
+from ...tolerances import COMPLEX_STEP, FOLLOWED, SAME_SPOT, SOLVED
+from ..modes.polynomials import krawczyk
+from .three_cranks import ThreeCranks
+
+Numbers = Sequence[Any] | NDArray[Any]
+"""Unknowns: numbers, arrays, balls or jets. Of one place: w₀, exp(iφ), w₁, w₂, two components each."""
+
+
+@dataclass(frozen=True)
+class SectionPoint(Record, all_recorded=True):
+    """A place of the surface: the turn of the first crank's w₀ in the plane, that of the platform since the goal, and
+    the directions of e₁, e₂ (rad). ``radius``: of the box that is proved to hold exactly one such point (rad,
+    characteristic lengths), for all geometries within ``tolerances.FOLLOWED``; None where it was found alone."""
+
+    crank: float
+    turn: Annotated[float, As("phi")]
+    directions: tuple[float, float]
+    radius: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class SingularitySlice(Record):
+    """The ``curve`` of Type 2 singularities as polylines (n, 4) of crank, turn and two directions (rad), its cusps and
+    its nodes (two places each), as far as they were found."""
+
+    robot: ThreeCranks
+    held: complex
+    curve: tuple[Array, ...]
+    cusps: Recorded[tuple[SectionPoint, ...]]
+    nodes: Recorded[tuple[tuple[SectionPoint, SectionPoint], ...]]
+
+    held_record = Shown(str, lambda self: self.robot.labels[0], As("held"))
+    directions = Shown(list[str], lambda self: self.robot.labels[1:])
+
+
+def _times(a: Numbers, b: Numbers) -> Any:
+    """a × b of two vectors of the plane."""
+    return a[0] * b[1] - a[1] * b[0]
+
+
+def _square(a: Numbers) -> Any:
+    return a[0] * a[0] + a[1] * a[1]
+
+
+def _aside(factor: Any, a: Numbers) -> list[Any]:
+    """i a times a number."""
+    return [-factor * a[1], factor * a[0]]
+
+
+class _Place(NamedTuple):
+    """What one place gives: what must vanish for the lengths, and e_k, r_k, m_k, n_k of k = 1, 2; w_k of all."""
+
+    lengths: list[Any]
+    w: tuple[Numbers, ...]
+    rods: list[list[Any]]
+    r: list[list[Any]]
+    m: list[Any]
+    n: list[Any]
+
+    @property
+    def f(self) -> Any:
+        """m₂ n₁ − m₁ n₂."""
+        return self.m[1] * self.n[0] - self.m[0] * self.n[1]
+
+    def motion(self, pick: int) -> tuple[Any, Any]:
+        """(t, ω) = (m_k, −n_k) of a leg ``pick``, 1 or 2."""
+        return self.m[pick - 1], -self.n[pick - 1]
+
+    def rate(self, pick: int) -> Any:
+        """g: the rate of f in that motion, ṙ_k = ω i r_k and ẇ_k = v + ṙ_k."""
+        t, omega = self.motion(pick)
+        v = _aside(t, self.w[0])
+        m, n = [], []
+        for r, w in zip(self.r, self.w[1:], strict=True):
+            turned = _aside(omega, r)
+            moved = [v[0] + turned[0], v[1] + turned[1]]
+            m.append(_times(turned, w) + _times(r, moved))
+            n.append(_times(v, w) + _times(self.w[0], moved))
+        return m[1] * self.n[0] + self.m[1] * n[0] - m[0] * self.n[1] - self.m[0] * n[1]
+
+
+@dataclass(frozen=True, eq=False)
+class LockedLegSection:
+    """Three cranks with the first rod held at the unit direction ``held``; ``number`` turns their lengths into the
+    numbers that the unknowns are made of (for balls: those that hold all geometries meant)."""
+
+    robot: ThreeCranks
+    held: complex
+    number: Callable[[float], Any] = float
+
+    def place(self, x: Numbers) -> _Place:
+        """What unknowns (8,) give."""
+        robot, number = self.robot, self.number
+        w, (c, s) = (x[0:2], x[4:6], x[6:8]), x[2:4]
+        base = robot.feet[0] + robot.rods[0] * self.held
+        r, e = [], []
+        for k in (1, 2):
+            b, away = robot.corners[k], base - robot.feet[k]
+            turned = [c * number(b.real) - s * number(b.imag), s * number(b.real) + c * number(b.imag)]
+            r.append(turned)
+            e.append(
+                [number(away.real) + w[0][0] + turned[0] - w[k][0], number(away.imag) + w[0][1] + turned[1] - w[k][1]]
+            )
+        lengths = [
+            _square(x[2:4]) - 1,
+            *(_square(w[k]) - number(robot.cranks[k]) ** 2 for k in range(3)),
+            *(_square(e[k]) - number(robot.rods[k + 1]) ** 2 for k in (0, 1)),
+        ]
+        return _Place(lengths, w, e, r, [_times(r[k], w[k + 1]) for k in (0, 1)], [_times(w[0], w[k]) for k in (1, 2)])
+
+    def curve(self, x: Numbers) -> list[Any]:
+        """What vanishes on the curve, (7,)."""
+        at = self.place(x)
+        return [*at.lengths, at.f]
+
+    def cusp(self, x: Numbers, pick: int) -> list[Any]:
+        """What vanishes at a cusp, (8,)."""
+        at = self.place(x)
+        return [*at.lengths, at.f, at.rate(pick)]
+
+    def node(self, x: Numbers) -> list[Any]:
+        """What vanishes at a node, (16,): the second place has the first one's rods, and so their lengths."""
+        one, two = self.place(x[:8]), self.place(x[8:])
+        apart = [a - b for e, h in zip(one.rods, two.rods, strict=True) for a, b in zip(e, h, strict=True)]
+        return [*one.lengths, one.f, *two.lengths[:4], two.f, *apart]
+
+
+def section(robot: ThreeCranks, held: complex) -> SingularitySlice:
+    """The curve, its cusps and its nodes: found on a grid of ``budgets.SECTION_STEPS`` turns of crank and platform, and
+    enclosed where Krawczyk's operator proves them."""
+    leg, thick = LockedLegSection(robot, held), LockedLegSection(robot, held, _ball)
+    traces = list(_traces(leg))
+    cusps: list[tuple[Array, SectionPoint]] = []
+    for x in (x for trace in traces for x in _changes(leg, trace)):
+        at = leg.place(x)
+        pick = 1 + int(np.argmax([np.linalg.norm(at.motion(k)) for k in (1, 2)]))
+        found = _newton(partial(leg.cusp, pick=pick), x)
+        # where (t, ω) vanishes f and g do so too, which says nothing
+        if found is None or np.linalg.norm(leg.place(found).motion(pick)) < SAME_SPOT:
+            continue
+        if any(np.linalg.norm(found - other) < SAME_SPOT for other, _ in cusps):
+            continue
+        box = krawczyk(_rows(partial(thick.cusp, pick=pick), 8), list(around(found, 0.0)))
+        if box is not None and all(size.contains(0) for size in thick.place(box).motion(pick)):
+            box = None
+        cusps.append((found, _point(leg, found, box)))
+    nodes: list[tuple[Array, tuple[SectionPoint, SectionPoint]]] = []
+    for x in _meetings(traces):
+        found = _newton(leg.node, x)
+        if found is None or np.linalg.norm(found[:8] - found[8:]) < SAME_SPOT:
+            continue
+        if any(
+            min(np.linalg.norm(found - other), np.linalg.norm(np.roll(found, 8) - other)) < SAME_SPOT
+            for other, _ in nodes
+        ):
+            continue
+        box = krawczyk(_rows(thick.node, 16), list(around(found, 0.0)))
+        if box is not None and all(a.overlaps(b) for a, b in zip(box[:8], box[8:], strict=True)):
+            box = None
+        halves = (None, None) if box is None else (box[:8], box[8:])
+        nodes.append((found, (_point(leg, found[:8], halves[0]), _point(leg, found[8:], halves[1]))))
+    return SingularitySlice(
+        robot,
+        held,
+        tuple(trace.shown for trace in traces),
+        tuple(point for _, point in cusps),
+        tuple(pair for _, pair in nodes),
+    )
+
+
+def _ball(value: float) -> Any:
+    from flint import arb
+
+    return arb(float(value), FOLLOWED)
+
+
+class _Trace(NamedTuple):
+    """A piece of the curve: unknowns (n, 8), and crank, turn and directions (n, 4)."""
+
+    unknowns: Array
+    shown: Array
+
+
+def sheet(robot: ThreeCranks, held: complex, crank: Array, turn: Array, sides: tuple[int, int]) -> Array:
+    """Unknowns (8, ...) where the first crank and the platform have these turns (rad) and the other cranks are on these
+    sides of the lines to their tips; NaN out of reach."""
+    w, rotation = [robot.cranks[0] * np.exp(1j * crank)], np.exp(1j * turn)
+    for k, side in zip((1, 2), sides, strict=True):
+        D = robot.feet[0] + robot.rods[0] * held + w[0] + robot.corners[k] * rotation - robot.feet[k]
+        far = np.abs(D) ** 2
+        share = (far + robot.cranks[k] ** 2 - robot.rods[k] ** 2) / 2
+        with np.errstate(invalid="ignore", divide="ignore"):
+            w.append(D * (share + 1j * side * np.sqrt(robot.cranks[k] ** 2 * far - share**2)) / far)
+    return np.array([part for z in (w[0], rotation, w[1], w[2]) for part in (z.real, z.imag)])
+
+
+def _traces(leg: LockedLegSection) -> Iterator[_Trace]:
+    """The pieces of f = 0: each followed from a place where f changes its sign on one of the four sheets."""
+    ticks = np.linspace(-np.pi, np.pi, SECTION_STEPS + 1)
+    crank, turn = np.meshgrid(ticks, ticks, indexing="ij")
+    known = np.zeros((0, 8))
+    for one, other in product((1, -1), repeat=2):
+        x = sheet(leg.robot, leg.held, crank, turn, (one, other))
+        signs = np.sign(leg.place(x).f)
+        here = (signs[1:, 1:] * signs[:-1, 1:] < 0) | (signs[1:, 1:] * signs[1:, :-1] < 0)
+        for seed in x[:, 1:, 1:][:, here].T:
+            if len(known) and np.min(np.linalg.norm(known - seed, axis=1)) < SECTION_APART:
+                continue
+            start = _newton(leg.curve, seed, FOLLOWED)
+            if start is None or (len(known) and np.min(np.linalg.norm(known - start, axis=1)) < SECTION_APART):
+                continue
+            unknowns = _follow_curve(leg, start)
+            known = np.vstack([known, unknowns])
+            yield _Trace(unknowns, np.column_stack(_angles(leg, unknowns.T)))
+
+
+def _follow_curve(leg: LockedLegSection, start: Array) -> Array:
+    """Places (n, 8) of a piece of the curve, step by step until it closes; in both directions where it ends."""
+    ways = []
+    for sense in (1.0, -1.0):
+        here, way, tangent = start, [start], sense * np.linalg.svd(_slopes(leg.curve, start))[2][-1]
+        while len(way) < SECTION_PLACES:
+            found = _newton(leg.curve, here + SECTION_STEP * tangent, FOLLOWED)
+            if found is None or np.linalg.norm(found - here) > 2 * SECTION_STEP:
+                break
+            ahead = np.linalg.svd(_slopes(leg.curve, found))[2][-1]
+            here, tangent = found, ahead * np.sign(ahead @ tangent)
+            way.append(here)
+            if len(way) > 3 and np.linalg.norm(here - start) < SECTION_STEP:
+                return np.array([*way, start])
+        ways.append(way)
+    return np.array([*ways[1][:0:-1], *ways[0]])
+
+
+def _angles(leg: LockedLegSection, x: Array) -> list[Array]:
+    """Crank, turn and two directions (rad) at unknowns (8, ...)."""
+    one, two = leg.place(x).rods
+    return [np.arctan2(v[1], v[0]) for v in (x[0:2], x[2:4], one, two)]
+
+
+def _changes(leg: LockedLegSection, trace: _Trace) -> Iterator[Array]:
+    """Places between which the rate of f in the motion that is left changes its sign."""
+    for pick in (1, 2):
+        g = leg.place(trace.unknowns.T).rate(pick)
+        yield from trace.unknowns[np.flatnonzero(np.sign(g[1:]) != np.sign(g[:-1]))]
+
+
+def _meetings(traces: Sequence[_Trace]) -> Iterator[Array]:
+    """Pairs of places, (16,), near which images of pieces cross each other."""
+    parts = [np.hstack([t.shown[:-1, 2:], t.shown[1:, 2:], t.unknowns[:-1]]) for t in traces]
+    segments = np.vstack(parts) if parts else np.zeros((0, 12))
+    start, step, places = segments[:, :2], segments[:, 2:4] - segments[:, :2], segments[:, 4:]
+    step[np.max(np.abs(step), axis=1) > np.pi] = np.nan
+    for i in range(len(segments) - 1):
+        away, other = start[i + 1 :] - start[i], step[i + 1 :]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            across = _times(step[i], other.T)
+            here, there = _times(away.T, other.T) / across, _times(away.T, step[i]) / across
+        for j in np.flatnonzero((here >= 0) & (here <= 1) & (there >= 0) & (there <= 1)) + i + 1:
+            if np.linalg.norm(places[j] - places[i]) > SECTION_APART:
+                yield np.concatenate([places[i], places[j]])
+
+
+def _newton(system: Callable[[Numbers], list[Any]], x: Array, enough: float = SOLVED) -> Array | None:
+    """A zero near unknowns (n,), the nearest where there are more unknowns than equations; None where there is none."""
+    for _ in range(SECTION_ITERATIONS):
+        step = np.linalg.lstsq(_slopes(system, x), np.array(system(x), dtype=float))[0]
+        x = x - step
+        size = np.linalg.norm(step)
+        if size < enough:
+            return x
+        if not size < 1.0:
+            return None
+    return None
+
+
+def _slopes(system: Callable[[Numbers], list[Any]], x: Array) -> Array:
+    """The Jacobian by complex steps: the system is polynomial."""
+    return np.array(system(x[:, None] + COMPLEX_STEP * 1j * np.eye(len(x)))).imag / COMPLEX_STEP
+
+
+@dataclass(eq=False)
+class _System:
+    """Rows of a system for Krawczyk's operator: values, and slopes by jets, computed once for each box."""
+
+    system: Callable[[Numbers], list[Any]]
+    count: int
+    known: tuple[Any, list[Any]] | None = None
+
+    def slopes(self, x: Sequence[Any]) -> list[list[Any]]:
+        """The Jacobian at balls x (n,)."""
+        if self.known is None or self.known[0] is not x:
+            columns = []
+            for i in range(self.count):
+                y: list[Any] = list(x)
+                y[i] = jets(np.array([x[i]], dtype=object))[0]
+                columns.append([value[1] if hasattr(value, "prec") else 0 * x[i] for value in self.system(y)])
+            self.known = x, [list(row) for row in zip(*columns, strict=True)]
+        return self.known[1]
+
+
+class _Row(NamedTuple):
+    """One equation of a system."""
+
+    whole: _System
+    number: int
+
+    def value(self, x: Sequence[Any]) -> Any:
+        """The value at balls x."""
+        return self.whole.system(x)[self.number]
+
+    def slopes(self, x: Sequence[Any]) -> Sequence[Any]:
+        """The derivative by each unknown."""
+        return self.whole.slopes(x)[self.number]
+
+
+def _rows(system: Callable[[Numbers], list[Any]], count: int) -> list[_Row]:
+    whole = _System(system, count)
+    return [_Row(whole, number) for number in range(count)]
+
+
+def _point(leg: LockedLegSection, x: Array, box: Sequence[Any] | None) -> SectionPoint:
+    """A place by its unknowns, and the box that was proved."""
+    angles = [float(angle) for angle in _angles(leg, x)]
+    radius = None if box is None else max(float(abs(ball - float(v)).upper()) for ball, v in zip(box, x, strict=True))
+    return SectionPoint(angles[0], angles[1], (angles[2], angles[3]), radius)

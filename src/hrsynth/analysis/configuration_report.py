@@ -1,0 +1,274 @@
+"""One configuration under examination: ranks, kinds of singularities, distances to them, redundant constraints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import Annotated, NamedTuple
+
+import numpy as np
+
+from ..budgets import REMEMBERED
+from ..geometry.vectors import Array
+from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.joint_coordinates import OfConfiguration
+from ..kinematics.limits import flat_wrists, outside
+from ..kinematics.velocity_relation import VelocityRelation, relation, relation_of
+from ..mechanism.pose import Pose
+from ..records import OPTIONAL, As, Number, Record, Recorded, Shown, recorded
+from ..results import Value
+from ..tolerances import PASSED_BY, RANK_GAP
+from .formation import Formation, formation_at, special_at
+from .freedoms import Freedom, name_freedoms
+from .observed import Mobility, ObservedRobot
+from .singularity_indices import (
+    Counts,
+    Redundancy,
+    Rows,
+    SingularityIndices,
+    gap_of,
+    generic,
+    interaction_matrix,
+    list_redundant,
+    redundant_rows,
+    surplus,
+    usual_rows,
+)
+
+UNDECIDED, REGULAR, CONSTRAINT = "undecided", "regular", "constraint"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SingularityReport(Value, all_recorded=True):
+    """What one relation says at a configuration: the freedoms that are seen, the gap of all ranks, the six counts (None
+    where the gap is too small for a verdict) and the freedoms that are not seen."""
+
+    rank: int
+    gap: Annotated[float, "the smallest ratio of a singular value that counts to one that does not"]
+    singularity_indices: SingularityIndices | None
+    unobserved: tuple[Freedom, ...] = ()
+
+    type1 = Shown(bool | None, lambda self: self.singularity_indices and self.singularity_indices.type1)
+    type2 = Shown(bool | None, lambda self: self.singularity_indices and self.singularity_indices.type2)
+    type3 = Shown(bool | None, lambda self: self.singularity_indices and self.singularity_indices.type3)
+
+    @property
+    def state(self) -> str:
+        """The kind of singularity in one word."""
+        found = self.singularity_indices
+        if found is None:
+            return UNDECIDED
+        if found.IIM > 0:
+            return CONSTRAINT
+        return "type3" if found.type3 else "type2" if found.type2 else "type1" if found.type1 else REGULAR
+
+
+@dataclass(frozen=True)
+class SingularityDistances(Record, all_recorded=True):
+    """How far a configuration is from each kind (0: there); lengths in characteristic lengths.
+
+    ``type2`` is the smallest singular value of Mᵀ on the feasible twists that are generically seen, ``type1`` one over
+    the largest, ``condition`` the largest over the smallest; None where Mᵀ does not exist even generically.
+    ``constraints`` is the weakest singular value of the loops, as part of the largest. ``millimetres`` and ``degrees``
+    are the platform's motion along its weakest freedom for each degree by which the observed directions are wrong; None
+    where it is infinite, where Mᵀ does not exist and where something else than angles is measured.
+    """
+
+    type2: float | None
+    type1: float | None
+    constraints: float
+    condition: float | None
+    millimetres: Annotated[float | None, As("mm_per_degree")]
+    degrees: Annotated[float | None, As("degrees_per_degree")]
+
+
+class Constraint(NamedTuple):
+    """Whether the loops lose rank, and the freedoms that the platform has only here."""
+
+    singular: bool | None
+    rank_lost: int | None
+    gained: tuple[Freedom, ...]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ConfigurationReport(OfConfiguration, Value):
+    """All that is said of one configuration."""
+
+    configuration: ClosedConfiguration
+    pose: Recorded[Pose]
+    mobility: Recorded[Mobility]
+    dof: Recorded[int]
+    hidden: Annotated[SingularityReport, As(flat=True, without=("rank",))]
+    real: Annotated[SingularityReport | None, "what the motors determine"]
+    """The real robot with its own motors; None where it has none."""
+    distances: Recorded[SingularityDistances]
+    gained: tuple[Freedom, ...] = ()
+    """At a constraint singularity: the freedoms that the platform has here and not in general."""
+    redundant: Recorded[tuple[Redundancy, ...]] = ()
+    """Loop constraints that are redundant only here."""
+    formation: Annotated[Formation | None, Formation, OPTIONAL] = None
+    """Of a formation: what is not seen here; ``pose`` is that of its first body."""
+
+    rank = Shown(int, lambda self: self.hidden.rank)
+    condition = Shown(Number, lambda self: self.distances.condition)
+
+    @property
+    @recorded()
+    def constraint(self) -> Constraint:
+        """Whether the loops lose rank, and the freedoms that the platform has only here."""
+        lost = None if self.hidden.singularity_indices is None else self.hidden.singularity_indices.IIM
+        return Constraint(self.constraint_singular, lost, self.gained)
+
+    @cached_property
+    @recorded()
+    def beyond_limits(self) -> tuple[str, ...]:
+        """The joints that are beyond their limits."""
+        return tuple(outside(self.configuration.model, self.configuration.q))
+
+    @cached_property
+    @recorded()
+    def singular_spherical_joints(self) -> dict[str, float]:
+        """S joints that stand for several R which are (nearly, rad) at a singularity of their own, which the S does not
+        have (docs/pages/theory.md, section 1)."""
+        return flat_wrists(self.configuration.model, self.configuration.q)
+
+    @property
+    def gap(self) -> float:
+        """The smallest gap of all ranks."""
+        return self.hidden.gap if self.real is None else min(self.hidden.gap, self.real.gap)
+
+    @property
+    def decided(self) -> bool:
+        """Whether every rank is a verdict."""
+        return self.gap >= RANK_GAP
+
+    @property
+    def constraint_singular(self) -> bool | None:
+        """Whether the loops have lost rank; None where that is not decided."""
+        return None if self.hidden.singularity_indices is None else self.hidden.singularity_indices.IIM > 0
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ConfigurationAnalysis(Value):
+    """A setting with its generic values, against which single configurations are held."""
+
+    setup: ObservedRobot
+
+    @classmethod
+    @lru_cache(maxsize=REMEMBERED)
+    def of(cls, setup: ObservedRobot) -> ConfigurationAnalysis:
+        """The one of an observed robot: its generic values are computed once."""
+        return cls(setup)
+
+    @cached_property
+    def usual(self) -> Counts:
+        """The generic counts of the observed directions."""
+        return generic([Counts.of(member.relation) for member in self.setup.samples.members])
+
+    @cached_property
+    def usual_real(self) -> Counts:
+        """The generic counts of the motors."""
+        return generic([Counts.of(self._real(at)) for at in self.setup.configurations])
+
+    @cached_property
+    def redundant(self) -> Rows:
+        """The redundant rows of each loop in general."""
+        return usual_rows(self.setup.configurations)
+
+    @cached_property
+    def _usually_special(self) -> bool:
+        """Whether all that is sensed of a formation lies in a line or plane everywhere."""
+        return all(special_at(at, self.setup.samples.observation_model) for at in self.setup.configurations)
+
+    def _real(self, at: ClosedConfiguration) -> VelocityRelation:
+        return relation_of(at, self.setup.samples.observation_model, np.eye(at.model.nv)[at.model.actuated_indices()])
+
+    def classify(self, at: ClosedConfiguration) -> ConfigurationReport:
+        """What can be said without names: no freedoms, no redundant constraints."""
+        setup = self.setup
+        found = relation(at, setup.samples.observation_model)
+        told = relation(at, replace(setup.all_samples.observation_model, observations=setup.telling_idle))
+        real = self._kinds(self._real(at), self.usual_real) if at.model.actuated_indices() else None
+        mobility = Mobility(found.mobility, found.mobility - told.dimension)
+        return ConfigurationReport(
+            at,
+            setup.motion.pose(at.pose(setup.motion.link)),
+            mobility,
+            found.dof.value,
+            self._kinds(found, self.usual),
+            real,
+            self._distances(at, found),
+        )
+
+    def examine(self, at: ClosedConfiguration) -> ConfigurationReport:
+        """All that can be said of a configuration."""
+        posture = self.classify(at)
+        hidden, real = posture.hidden, posture.real
+        found = relation(at, self.setup.samples.observation_model)
+        if self.setup.mechanism.formation:
+            here = formation_at(at, self.setup.samples.observation_model, found, self.setup.decomposition)
+            if (special := special_at(at, self.setup.samples.observation_model)) and not self._usually_special:
+                here = replace(here, special=special)
+            extra = surplus(redundant_rows(at), self.redundant)
+            return replace(
+                posture,
+                formation=here if hidden.singularity_indices else None,
+                redundant=list_redundant(extra, generic=False),
+            )
+        hidden = replace(
+            hidden, unobserved=self._name_freedoms(at, found.unobserved_twists) if hidden.singularity_indices else ()
+        )
+        if real is not None and real.singularity_indices:
+            real = replace(real, unobserved=self._name_freedoms(at, self._real(at).unobserved_twists))
+        extra = surplus(redundant_rows(at), self.redundant)
+        gained = self._name_freedoms(at, self._gained_twists(found)) if posture.constraint_singular else ()
+        return replace(posture, hidden=hidden, real=real, gained=gained, redundant=list_redundant(extra, generic=False))
+
+    @staticmethod
+    def _kinds(found: VelocityRelation, usual: Counts) -> SingularityReport:
+        gap = gap_of(found)
+        return SingularityReport(
+            found.rank, gap, SingularityIndices.of(Counts.of(found), usual) if gap >= RANK_GAP else None
+        )
+
+    def _distances(self, at: ClosedConfiguration, found: VelocityRelation) -> SingularityDistances:
+        constraints = 0.0 if found.mobility > self.usual.mobility else at.kernel()[1].weakest
+        M = interaction_matrix(found)
+        if M is None or self.usual.unexplained:
+            reached = None if self.usual.unexplained else 0.0
+            return SingularityDistances(None, reached, constraints, None, None, None)
+        rank = found.dof.value - self.usual.unseen
+        _, values, right = np.linalg.svd(M, full_matrices=False)
+        largest = float(values[0]) if rank else 0.0
+        if not rank or found.rank < rank:
+            return SingularityDistances(0.0, 1 / largest if largest else None, constraints, None, None, None)
+        weakest = float(values[rank - 1])
+        moved = found.twists @ right[rank - 1] / weakest
+        if found.twist_rows > 6 or not all(each.angular for each in self.setup.observed):
+            return SingularityDistances(weakest, 1 / largest, constraints, largest / weakest, None, None)
+        return SingularityDistances(
+            weakest,
+            1 / largest,
+            constraints,
+            largest / weakest,
+            1e3 * at.model.length * float(np.linalg.norm(moved[:3])) * float(np.radians(1)),
+            float(np.linalg.norm(moved[3:])),
+        )
+
+    def _gained_twists(self, found: VelocityRelation) -> Array:
+        """The platform's twists that it has only here; all of them where the general ones change from pose to pose."""
+        if found.dof.value <= self.usual.dof:
+            return np.zeros((found.twist_rows, 0))
+        usual = self.setup.motion.twists[: found.twist_rows]
+        if usual.shape[1] != self.usual.dof:
+            return found.twists
+        beside = np.linalg.svd(found.twists - usual @ (usual.T @ found.twists), full_matrices=False)[0]
+        return np.asarray(beside[:, : found.dof.value - self.usual.dof])
+
+    def _name_freedoms(self, at: ClosedConfiguration, twists: Array) -> tuple[Freedom, ...]:
+        """Twists (3 or 6, k) in characteristic lengths as named freedoms."""
+        setup = self.setup
+        start = setup.all_samples.start
+        at_zero = at.model is start.model and np.max(np.abs(at.q - start.q), initial=0.0) < PASSED_BY * PASSED_BY
+        position = None if at_zero else at.pose(self.setup.motion.link)[:3, 3]
+        return name_freedoms(twists, setup.decomposition, setup.labels, position)

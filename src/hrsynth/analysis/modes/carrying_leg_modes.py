@@ -1,0 +1,242 @@
+"""All modes of a platform that one leg carries: as many closings as there may be, each in a box of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ...budgets import LARGEST_LOOPS, PLANAR_STARTS
+from ...constraints.pattern import leg_ends
+from ...errors import SystemNotSolved, UnsupportedLocus
+from ...geometry.vectors import Array, cross, frozen, hat
+from ...kinematics.configuration import ClosedConfiguration
+from ..measured import MeasuredRobot
+from .branches import Model
+from .carrying_leg import carried_platform
+from .carrying_leg_system import CarriedCondition, CarriedEquation, CarriedPlatform
+from .conditions import PoseCondition
+from .joint_forms import closings_bound, eigenvalues
+from .polynomials import Polynomial, krawczyk
+from .pose_boxes import FAR_FROM_REAL, PRECISION, PoseBox, UnitLength, as_box, at_middle, told_far, zeros
+from .pose_forms import Poses
+from .solve import SystemMode, SystemModes
+
+FEW_JOINTS = 2
+"""Joints up to which random starts find all zeros soon."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Half(CarriedEquation):
+    """A condition in the tangents t of half the angles and in slides, numbers as they are: with an axis a the turn of
+    the quaternion 1 + t a, whatever the length of a."""
+
+    idle: frozenset[int]
+
+    def point_and_arrow(self, x: Sequence[Any]) -> tuple[Any, Any, list[tuple[int, Any, Any]]]:
+        R, p, at = self.of(np.eye(3)), self.of(np.zeros(3)), list[tuple[int, Any, Any]]()
+        for k, each in enumerate(self.freedoms[: self.joints]):
+            if k in self.idle:
+                continue
+            a, o, t = self.of(each.axis), self.of(each.point), x[k]
+            if each.slides:
+                at.append((k, None, R @ a))
+                p = p + R @ a * t
+                continue
+            w = 1 + t * t * (a @ a)
+            at.append((k, R @ a * (2 / w), p + R @ o))
+            turn = (
+                np.eye(3, dtype=int) * (2 - w) + np.outer(a, a) * (2 * t * t) + self.of(hat(each.axis)) * (2 * t)
+            ) / w
+            R, p = R @ turn, p + R @ (o - turn @ o)
+        point, arrow = p + R @ self.of(self.condition.b), R @ self.of(self.condition.c)
+        return (
+            point,
+            arrow,
+            [
+                (k, place, 0 * arrow) if rate is None else (k, cross(rate, point - place), cross(rate, arrow))
+                for k, rate, place in at
+            ],
+        )
+
+
+@dataclass(frozen=True)
+class _Fixed:
+    """An unknown, by its number, that has a value."""
+
+    k: int
+    at: int
+
+    def value(self, x: Sequence[Any]) -> Any:
+        """The value at x."""
+        return x[self.k] - self.at
+
+    def slopes(self, x: Sequence[Any]) -> Any:
+        """The derivative by each unknown at x."""
+        return [0 * v + (j == self.k) for j, v in enumerate(x)]
+
+
+def proposals(system: CarriedPlatform, most: int) -> Array:
+    """Common zeros (k, n) that Newton's method finds from random complex starts, each with its conjugate."""
+    rng, n, found = np.random.default_rng(0), len(system.freedoms_), np.zeros((0, len(system.freedoms_)))
+    for _ in range(PLANAR_STARTS):
+        start = rng.uniform(-np.pi, np.pi, (64, n)) + 3j * rng.normal(size=(64, n))
+        found = polish_zeros(system, start, found)
+        if len(found) >= most:
+            break
+    return found
+
+
+def polish_zeros(system: CarriedPlatform, q: Array, known: Iterable[Array] = ()) -> Array:
+    """The common zeros (k, n) to which Newton's method leads, each with its conjugate, after those that are known."""
+    slides, found = np.array([each.slides for each in system.freedoms_]), list(known)
+    with np.errstate(all="ignore"):
+        for _ in range(100):
+            F, J = system.values(q, system.square)
+            good = np.all(np.isfinite(J), axis=(1, 2)) & np.all(np.isfinite(F), axis=1)
+            q, F, J = q[good], F[good], J[good]
+            try:
+                step = np.linalg.solve(J, F[:, :, None])[:, :, 0]
+            except np.linalg.LinAlgError:
+                step = (np.linalg.pinv(J) @ F[:, :, None])[:, :, 0]
+            q = q - step / np.maximum(1.0, 2.0 * np.abs(step).max(axis=1))[:, None]
+    for each in (y for x in q[np.abs(step).max(axis=1) < 1e-10] for y in (x, x.conj())):
+        turned = np.angle(np.exp(1j * each.real)) + 1j * each.imag
+        at = np.where(slides, each, turned)
+        apart = (np.abs(np.where(slides, at - other, np.exp(1j * (at - other)) - 1.0)).max() for other in found)
+        if not any(far < 1e-6 for far in apart):
+            found.append(at)
+    return np.array(found).reshape(-1, len(slides))
+
+
+def solve_carried(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0) -> tuple[Model, SystemModes]:
+    """All modes, with the goal known to ``error`` (m). Raises ``UnsupportedLocus``, and ``Unsolved`` where not all
+    zeros are enclosed that there may be."""
+    if not np.isfinite(error):
+        raise UnsupportedLocus(measured.setup.robot.name, "no distance bounds how far it is from where its loops close")
+    system = carried_platform(measured, goal, error)
+    (body,) = leg_ends(measured.setup.decomposition)
+    return Model(system, lambda q: {body: system.pose(q)}, system.home), _judge(system)
+
+
+def enclose_zeros(system: CarriedPlatform, proposed: Array) -> list[PoseBox]:
+    """Boxes of common zeros in c, s and t, apart from each other."""
+    n = len(system.freedoms_)
+    equations: list[Polynomial] = [system.equation(each) for each in system.square]
+    for k, each in enumerate(system.freedoms_):
+        equations += [_Fixed(k, 1), _Fixed(n + k, 0)] if each.slides else [UnitLength((k, n + k)), _Fixed(2 * n + k, 0)]
+    return zeros(equations, map(system.unknowns, proposed))[0]
+
+
+def _far(system: CarriedPlatform, proposed: Array, known: Sequence[PoseBox]) -> list[PoseBox]:
+    """Boxes of the zeros, of the numbers as they are, at which a turn is far from real, apart from those known."""
+    from flint import acb, ctx
+
+    equations: list[Polynomial] = [
+        _Half(each.condition, Poses.spatial(), None, system.freedoms_, each.joints, each.idle) for each in system.square
+    ]
+    slides, found = np.array([each.slides for each in system.freedoms_]), list[PoseBox]()
+    with ctx.workprec(PRECISION):
+        for q in proposed:
+            if np.abs(q.imag[~slides]).max(initial=0.0) < FAR_FROM_REAL or at_middle(known, system.unknowns(q)):
+                continue
+            with np.errstate(all="ignore"):
+                start = np.where(slides, q, np.tan(q / 2.0))
+            half = krawczyk(equations, [acb(v.real, v.imag) for v in start.tolist()])
+            if half is None:
+                continue
+            squares = [1 + t * t for t in half]
+            box = as_box(
+                [
+                    *(t * 0 + 1 if slid else 2 / w - 1 for t, w, slid in zip(half, squares, slides, strict=True)),
+                    *(t * 0 if slid else 2 * t / w for t, w, slid in zip(half, squares, slides, strict=True)),
+                    *(t if slid else t * 0 for t, slid in zip(half, slides, strict=True)),
+                ],
+                False,
+                0,
+            )
+            if box is not None and box.apart((*known, *found)):
+                found.append(replace(box, rounded=True))
+    return found
+
+
+def _judge(system: CarriedPlatform) -> SystemModes:
+    """The modes: as many zeros as the degrees allow."""
+    from flint import ctx
+
+    n, most = len(system.freedoms_), system.most(system.square)
+    size = f"{n} joint{'s' * (n > 1)} of the leg that carries the platform"
+    if most > LARGEST_LOOPS:
+        raise SystemNotSolved("the leg", f"{size}: up to {most} closings, too many (at most {LARGEST_LOOPS})")
+    why, bound = "degrees in each (Bézout)", "class"
+    boxes = enclose_zeros(system, proposals(system, most)) if n <= FEW_JOINTS else []
+    if len(boxes) < most and (counted := closings_bound(system, system.square)) is not None:
+        most, why, bound = counted.most, "ranks modulo a prime of 62 bits", "rank"
+        proposed = polish_zeros(system, eigenvalues(system, system.square, counted))
+        boxes = enclose_zeros(system, proposed)
+        boxes += _far(system, proposed, boxes)
+    at_goal = [box for box in boxes if box.real and box.holds(system.unknowns(system.home))]
+    if len(boxes) != most or len(at_goal) != 1:
+        raise SystemNotSolved("the leg", f"{size}: of {most} closings at most ({why}) {len(boxes)} have boxes")
+    bodies = [_body(system, box) for box in boxes]
+    if any(
+        all((a - b).contains(0) for a, b in zip(one, other, strict=True))
+        for k, one in enumerate(bodies)
+        for other in bodies[:k]
+    ):
+        raise SystemNotSolved("the leg", f"{size}: several of {most} closings have one pose of the platform")
+    besides = [system.equation(each) for each in system.told if each not in system.square]
+    real = [box for box in boxes if box.real]
+    with ctx.workprec(PRECISION):
+        kept = [
+            box for box in real if box is at_goal[0] or not any(not each.value(box.box).contains(0) for each in besides)
+        ]
+        modes = [as_mode(system, box, not besides or box is at_goal[0]) for box in kept]
+    proof = (
+        f"{size}: at most {most} closings by {why}, {len(boxes)} enclosed apart from each other, complex ones "
+        f"too{told_far(boxes)}, {len(real)} real"
+    )
+    if not besides:
+        return SystemModes(len(boxes), tuple(modes), True, proof, bound=bound, enclosed=True)
+    out = [as_mode(system, box, False) for box in real if box not in kept]
+    return SystemModes.of_more(modes, out, f"from {n} of {len(system.told)} conditions: {proof}", bound)
+
+
+def _body(system: CarriedPlatform, box: PoseBox) -> list[Any]:
+    """The position and the three columns of the turn that carries the platform from the goal, in balls."""
+    from flint import ctx
+
+    found = list[Any]()
+    with ctx.workprec(PRECISION):
+        for c in np.vstack([np.zeros(3), np.eye(3)]):
+            told = CarriedCondition(PoseCondition("", np.zeros(3), c), system.carrying)
+            at, arrow, _ = system.equation(told).point_and_arrow(box.box)
+            found += [*(arrow if c.any() else at)]
+    return found
+
+
+def as_mode(system: CarriedPlatform, box: PoseBox, proved: bool, miss: float | None = None) -> SystemMode:
+    """A real box as a mode, or as one that fits; ``miss``: how far it is from meeting all (sizes)."""
+    n, x = len(system.freedoms_), box.middle.real
+    q = np.array(
+        [x[2 * n + k] if each.slides else np.arctan2(x[n + k], x[k]) for k, each in enumerate(system.freedoms_)]
+    )
+    spread = [float(v.rad()) for v in _body(system, box)]
+    shift, turn = system.size * float(np.linalg.norm(spread[:3])), 2.0 * float(np.linalg.norm(spread[3:]))
+    if miss is None:
+        values, slopes = system.values(q, system.told)
+        misses = np.abs(values) / np.maximum(1.0, np.linalg.norm(slopes, axis=-1))
+        miss = float(np.max(misses)) if misses.size else np.inf
+    return SystemMode(
+        (),
+        max(shift / system.size, turn),
+        shift,
+        turn,
+        miss,
+        frozen(system.pose(q)),
+        frozen(q),
+        proved=proved,
+        match_residual=not proved,
+    )

@@ -1,0 +1,284 @@
+"""Modes of a formation: all its configurations with the same measurements, trivial motions taken out.
+
+Where no body turns, what a value leaves of a point are planes, linear in the slides: a rank proves that there are no
+configurations but similar ones (bearings in a common frame). Anything else is searched for from random starts, and each
+configuration that is found is brought to the first by the similarity of the group that takes it nearest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...budgets import SEARCH_ITERATIONS, SEARCH_QUIET, SEARCH_STARTS
+from ...errors import UndefinedValue
+from ...geometry.ranks import kernel_basis
+from ...geometry.vectors import Array, pose
+from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.tasks import FixedValuesTask, solve
+from ...kinematics.velocity_relation import ObservationModel, relation
+from ...mechanism import JointType
+from ...mechanism.cameras import CameraObservation
+from ...mechanism.observations.direction import SeenAxis
+from ...progress import report
+from ...tolerances import CHAIN_ROUNDING, CLOSED, MOVED, NAMED, NUMBER_ROUNDING, SAME_RELATION, SOLVED, VANISHES
+from ..formation import Formation, Similarities, formation_at, seen_at
+from ..observed import ObservedRobot
+from .goal_error import drift
+from .observation_loci import opposite
+
+Bodies = dict[str, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class FormedMode:
+    """A configuration with the measurements of the goal, the poses (4, 4) of its bodies moved by a trivial motion to
+    where they are nearest to the goal's, what is left of the measurements, and what is seen as the opposite value."""
+
+    configuration: ClosedConfiguration
+    bodies: Bodies
+    residual: float
+    opposite: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class FormedModes:
+    """The modes, the goal first, and what is known of them, named as of :class:`.solve.SystemModes`."""
+
+    formation: Formation
+    modes: tuple[FormedMode, ...]
+    proof: str
+    complete: bool = False
+    complex: int | None = None
+    bound: str = "none"
+    degenerate: str | None = None
+    continuum: int | None = None
+
+
+def formation_modes(setup: ObservedRobot) -> FormedModes:
+    """The modes of a formation with the measurements of its zero configuration."""
+    at, observation_model = setup.all_samples.start, setup.samples.observation_model
+    formation = formation_at(at, observation_model, relation(at, observation_model), setup.decomposition)
+    goal = FormedMode(at, {body: at.pose(body) for body in formation.bodies}, at.residual)
+    sliding = _Sliding(setup) if _slides(at) else None
+    if formation.count:
+        flexes = "; ".join(flex.name for flex in formation.flexes)
+        generic = setup.samples.members[0]
+        usual = formation_at(generic.configuration, observation_model, generic.relation, setup.decomposition).count
+        if formation.count == usual or (sliding is not None and not sliding.spheres):
+            words = f"no measured value shows {flexes}: a continuum of dimension {formation.count}"
+            return FormedModes(formation, (), words, degenerate=words, continuum=formation.count)
+        return FormedModes(
+            formation,
+            (goal,),
+            "others are not searched for: the configuration is singular",
+            degenerate=f"to first order no measured value shows {flexes}",
+        )
+    if formation.group is None:
+        return FormedModes(
+            formation, (goal,), "others are not searched for: a trivial motion ties a turn or a scale to another"
+        )
+    listed = None if sliding is None else sliding.modes(formation, goal)
+    return listed or _search(observation_model, formation, formation.group, goal)
+
+
+def _slides(at: ClosedConfiguration) -> bool:
+    """Whether all joints are slides that nothing closes: no body turns, and points are linear in the coordinates."""
+    mechanism = at.model.mechanism
+    return (
+        at.model.nv == len(mechanism.joints)
+        and not mechanism.couplings
+        and all(each.type is JointType.PRISMATIC and each.in_tree for each in mechanism.joints.values())
+    )
+
+
+class _Sliding:
+    """A formation whose bodies only slide, about its goal: what is measured are planes, linear in the slides, and
+    ``spheres``, vectors (3,) of constant length with their slopes (3, slides), metres."""
+
+    def __init__(self, setup: ObservedRobot) -> None:
+        self.at, self.question = setup.all_samples.start, setup.samples.observation_model
+        model = self.at.model
+        steps = [ClosedConfiguration.of(model, model.integrate(self.at.q, each)) for each in np.eye(model.nv)]
+        seen, points = seen_at(self.at, self.question)
+        known = drift(self.at, None, setup.normal.moved) + CHAIN_ROUNDING * float(np.abs(points).max(initial=0.0))
+        planes, nearest = list[Array](), np.inf
+        self.spheres: list[tuple[Array, Array]] = []
+        self.known = len(seen) == len(self.question.observations)
+        """Whether what each value leaves is known."""
+        for each, place in seen:
+            assert isinstance(each, CameraObservation | SeenAxis)
+            ends = [(each.link, 1.0), (each.seen_from or self.question.reference, -1.0)]
+            slopes = np.array(
+                [sum(sign * (step.pose(link) - self.at.pose(link))[:3, 3] for link, sign in ends) for step in steps]
+            ).T
+            loci = each.loci(place)
+            self.known &= bool(loci)
+            for locus in loci:
+                if locus.radius is not None:
+                    self.spheres.append((locus.place - locus.through, slopes))
+                elif not locus.turns:
+                    planes += list(locus.normals @ slopes / model.length)
+                    along = isinstance(each, CameraObservation) and each.axis is not None
+                    nearest = min(nearest, float(np.linalg.norm((place.foot if along else place.B) - place.C)))
+        self.rows = np.array(planes).reshape(-1, model.nv)
+        self.slack = NUMBER_ROUNDING + MOVED * known / nearest
+        """How far their entries can be from the exact ones."""
+
+    def modes(self, formation: Formation, goal: FormedMode) -> FormedModes | None:
+        """All modes of a rigid formation; None where the planes leave more than similarities, one of them perhaps cut
+        by spheres, or that cannot be proved."""
+        group, (kernel, seen) = formation.group, kernel_basis(self.rows, 1.0)
+        more = kernel.shape[1] - len(formation.trivial)
+        if not self.known or group is None or group.axes.shape[1] or more > bool(self.spheres) * (not group.scaled):
+            return None
+        if more < 0 or not _has_rank(self.rows, self.slack, seen.value):
+            return None
+        proof = (
+            f"{len(self.rows)} planes in {self.at.model.nv} slides, of rank {seen.value} for all that the file's "
+            "decimals allow (interval arithmetic): "
+        )
+        if not more:
+            return FormedModes(
+                formation,
+                (goal,),
+                proof
+                + "only trivial motions are left"
+                + ("; a negative scale would reverse what is measured" if group.scaled else ""),
+                True,
+                1,
+                "rank",
+            )
+        others = self._on_spheres(kernel, goal, group)
+        return (
+            None
+            if others is None
+            else FormedModes(
+                formation,
+                (goal, *others),
+                proof + "besides trivial motions a line is left, which the distances cut",
+                True,
+                1 + len(others),
+                "rank",
+            )
+        )
+
+    def _on_spheres(self, kernel: Array, goal: FormedMode, group: Similarities) -> list[FormedMode] | None:
+        """What the spheres leave of the line of the ``kernel`` that is no trivial motion: σ with (σ w + 2 v) · w = 0;
+        None where several nearly agree."""
+        changed = np.vstack([slopes @ kernel for _, slopes in self.spheres])
+        line = kernel @ np.linalg.svd(changed)[2][0]
+        cuts = [
+            -2.0 * (v @ w) / (w @ w)
+            for v, slopes in self.spheres
+            if np.linalg.norm(w := slopes @ line) > NAMED * self.at.model.length
+        ]
+        spread = float(np.ptp(cuts))
+        if spread > NAMED:  # no second point is on all spheres
+            return []
+        if spread > VANISHES or abs(cuts[0]) <= NAMED:
+            return None
+        at = ClosedConfiguration.of(self.at.model, self.at.model.integrate(self.at.q, cuts[0] * line))
+        bodies, _ = _nearest(at, self.at, self.question, group, tuple(goal.bodies))
+        reversed_ = opposite(self.question.observations, self.at, self.question.reference, at.pose)
+        return [FormedMode(at, bodies, at.residual, reversed_)]
+
+
+def _has_rank(rows: Array, slack: float, rank: int) -> bool:
+    """Whether all matrices whose entries are within ``slack`` of these have this rank at least: a minor that has an
+    inverse in interval arithmetic."""
+    from flint import arb, arb_mat
+    from scipy.linalg import qr
+
+    if not rank:
+        return True
+    chosen = qr(rows.T, mode="r", pivoting=True)[1][:rank]
+    columns = qr(rows[chosen], mode="r", pivoting=True)[1][:rank]
+    minor = rows[np.ix_(chosen, columns)]
+    try:
+        arb_mat([[arb(float(x), slack) for x in row] for row in minor]).inv()
+    except ZeroDivisionError:
+        return False
+    return True
+
+
+def _nearest(
+    at: ClosedConfiguration,
+    goal: ClosedConfiguration,
+    observation_model: ObservationModel,
+    group: Similarities,
+    bodies: Sequence[str],
+) -> tuple[Bodies, float]:
+    """The bodies at a configuration, moved by a trivial motion to where the sensed points are nearest to the goal's,
+    and how far points (characteristic lengths of the goal) and bodies that turn are from there."""
+    points, wanted = seen_at(at, observation_model)[1], seen_at(goal, observation_model)[1]
+    s, R, t = group.nearest(points, wanted) if len(points) else (1.0, np.eye(3), np.zeros(3))
+    found, off = Bodies(), float(np.abs(s * points @ R.T + t - wanted).max(initial=0.0)) / goal.model.length
+    for body in bodies:
+        X, turns = at.pose(body), bool(np.abs(at.model.frames(at.q, (body,))[1][0][3:]).max(initial=0.0) > NAMED)
+        found[body] = pose(s * R @ X[:3, 3] + t, R @ X[:3, :3] if turns else X[:3, :3])
+        off = max(off, float(np.abs(found[body][:3, :3] - goal.pose(body)[:3, :3]).max()))
+    return found, off
+
+
+def _search(
+    observation_model: ObservationModel, formation: Formation, group: Similarities, goal: FormedMode
+) -> FormedModes:
+    """The modes that random starts lead to."""
+    at = goal.configuration
+    model, rng, rank = at.model, np.random.default_rng(0), relation(at, observation_model).rank
+    held, modes, met = (
+        FixedValuesTask.at(model, at.q, observation_model.reference, observation_model.observations),
+        [goal],
+        [1],
+    )
+    starts = closed = quiet = loose = 0
+    while starts < SEARCH_STARTS and quiet < SEARCH_QUIET:
+        starts += 1
+        report("starts")
+        far = np.pi if starts % 2 else rng.uniform(0.0, np.pi)
+        try:
+            q, residual = solve(
+                model,
+                model.integrate(model.q0, rng.uniform(-far, far, model.nv)),
+                held,
+                tolerance=SOLVED,
+                iterations=SEARCH_ITERATIONS,
+            )
+        except UndefinedValue:  # on the way a point came to a camera's centre
+            continue
+        if residual > CLOSED:
+            continue
+        closed, quiet = closed + 1, quiet + 1
+        there = ClosedConfiguration.of(model, q)
+        if relation(there, observation_model).rank < rank:
+            loose += 1
+            continue
+        known = next(
+            (
+                k
+                for k, mode in enumerate(modes)
+                if _nearest(there, mode.configuration, observation_model, group, formation.bodies)[1] <= SAME_RELATION
+            ),
+            None,
+        )
+        if known is None:
+            bodies, _ = _nearest(there, at, observation_model, group, formation.bodies)
+            modes.append(FormedMode(there, bodies, residual))
+            met.append(1)
+            quiet = 0
+        else:
+            met[known] += 1
+    rare = sum(count == 1 for count in met[1:])
+    proof = f"found from {starts} random starts of all bodies, of which {closed} closed"
+    proof += f"; {rare} of the modes met only once" if rare else ""
+    return FormedModes(
+        formation,
+        tuple(modes),
+        proof,
+        degenerate=None
+        if not loose
+        else (f"{loose} starts ended at configurations, not listed, at which more motions are not seen"),
+    )

@@ -1,0 +1,124 @@
+"""The ways to list modes: by tips, by conditions on the pose, by loops, by a leg that carries the platform."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ...errors import HrsynthError, MissingExtra, SystemNotSolved, TooLarge, UnsupportedLocus
+from ...kinematics.assembly import of_links
+from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.pinocchio_model import PinocchioModel
+from ...mechanism.observations.encoder import Encoder
+from ...mechanism.sensors import encoders
+from ..measured import MeasuredRobot
+from ..observed import ObservedRobot
+from .branches import Model, solve_all
+from .carrying_leg_modes import solve_carried
+from .conditions import AtAngle
+from .observation_loci import all_loci
+from .planar_modes import solve_loops
+from .pose_conditions_solver import PosedPlatform, most_posed, solve_posed
+from .solve import SystemModes
+
+
+def without_couplings(
+    measured: MeasuredRobot, goal: ClosedConfiguration
+) -> tuple[MeasuredRobot, ClosedConfiguration] | None:
+    """The robot without its couplings, at the same place, and with what is measured held: so are joints that couplings
+    tie to motors that are held. It has all modes of the robot, and those at which couplings cannot be closed besides.
+    None where it has no couplings, sees less than all freedoms without them, or what is measured is of joints that are
+    one without them."""
+    mechanism, setup = goal.model.mechanism, measured.setup
+    if not mechanism.couplings:
+        return None
+    held = {each.joint for each in measured.observation_model.observations if isinstance(each, Encoder)}
+    ties = [
+        {mechanism.carrier(each, link).name for link in (each.predecessor, each.successor)}
+        for each in mechanism.couplings
+    ]
+    tied = set(held)
+    while more := set().union(*(tie for tie in ties if tie & tied)) - tied:
+        tied |= more
+    try:
+        loose = ObservedRobot.of(replace(setup.mechanism, couplings=(), observations=()))
+        at = of_links(PinocchioModel(loose.mechanism, goal.model.length), goal.pose)
+    except HrsynthError:
+        return None
+    links, joints = loose.mechanism.links, loose.mechanism.joints
+    if not tied <= joints.keys() or any(
+        link not in links
+        for each in measured.observation_model.observations
+        for link in (each.link, each.seen_from or each.link)
+    ):
+        return None  # without couplings what they hold apart is one joint
+    of = {name: leg.label for leg in loose.decomposition.legs for name in leg.joints}
+    seen = (
+        *measured.observation_model.observations,
+        *(
+            each
+            for name in sorted(tied - held)
+            for each in encoders(loose.mechanism, loose.mechanism.joints[name], of.get(name, ""))
+        ),
+    )
+    found = MeasuredRobot(loose, loose.measuring(seen))
+    return (found, at) if found.rank == loose.dof and loose.decomposition.labels == setup.decomposition.labels else None
+
+
+def better_ways(made: Model) -> tuple[Any, ...]:
+    """Ways that may count complex modes too where a list is that of a part of the conditions on the pose, as the sense
+    of an axis is told besides."""
+    system = made.system
+    senses = sum(isinstance(c, AtAngle) and c.h == 1.0 for c in getattr(system, "conditions", ()))
+    if not isinstance(system, PosedPlatform) or not senses:
+        return ()
+    few = len(system.conditions) - senses <= system.poses.freedoms
+    return (solve_loops, solve_carried) if few else (solve_loops,)
+
+
+def solve_tips(
+    measured: MeasuredRobot, goal: ClosedConfiguration, exact: float, as_written: bool, effort: float
+) -> tuple[Model, SystemModes]:
+    """All modes by where the tips of the legs can be, with the goal known to ``exact`` (m)."""
+    confined, seen = all_loci(measured, goal)
+    # a curve that was fitted to a leg's moves is not known to hold its exact tip
+    fitted = confined.doubt is not None or any(tip.doubt is not None for tip in confined.tips)
+    confined = replace(
+        confined,
+        error=np.inf
+        if fitted
+        else max([exact, *(each.error(exact, goal) for each in seen)])
+        + max([*(tip.moved for tip in confined.tips), *(angle.moved for angle in confined.angles)]),
+        as_written=as_written,
+    )
+    return solve_all(confined, effort=effort)
+
+
+def expected_modes(measured: MeasuredRobot, at: ClosedConfiguration) -> int:
+    """How many modes, complex ones too, the degrees of the legs' conditions allow; the largest number where these are
+    not known."""
+    try:
+        return most_posed(measured, at)
+    except (UnsupportedLocus, SystemNotSolved):
+        return sys.maxsize
+
+
+def count_modes(measured: MeasuredRobot, at: ClosedConfiguration) -> SystemModes:
+    """The modes with the measurements at a configuration, without near ones, and not read as poses of the robot's legs:
+    as :func:`modes`, for many configurations of one robot that sees all its freedoms."""
+    found = None
+    if measured.generic_pattern.motion != "oriented":
+        with suppress(UnsupportedLocus, SystemNotSolved, TooLarge, MissingExtra):
+            found = solve_all(all_loci(measured, at)[0], near=False)[1]
+    if found is not None and found.complete:
+        return found
+    try:
+        return solve_posed(measured, at)[1]
+    except (UnsupportedLocus, SystemNotSolved):
+        if found is None:
+            raise
+        return found

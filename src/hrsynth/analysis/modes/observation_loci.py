@@ -1,0 +1,229 @@
+"""What is seen of the platform from the base, or of the base from the platform, as curves and surfaces on which points
+are, angles that directions keep, and conditions on a pose (docs/pages/theory.md, section 8).
+
+Lines, planes and axes count without their sense: a pose at which a value is the opposite one is *antipodal*, no mode.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...constraints.pattern import leg_ends, recognise
+from ...errors import UndefinedValue, UnsupportedLocus
+from ...geometry.vectors import Array, inverse, transform
+from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.velocity_relation import ObservationModel
+from ...mechanism import Observation
+from ...mechanism.cameras import CameraObservation, FixedValueLocus
+from ...mechanism.legs import LegDecomposition
+from ...mechanism.observations.direction import Direction, SeenAxis
+from ...mechanism.observations.encoder import Encoder
+from ...tolerances import CHAIN_ROUNDING, EXACT, MOVED, SAME_SENSE
+from ..measured import MeasuredRobot
+from .conditions import AtAngle, OnMovingPlane, OnPlane, OnRevolution, PoseCondition
+from .goal_error import LEVER
+from .leg_conditions import OriginAndUnit
+from .loci import Circle, Line, Plane, Point, Reach, Sphere
+from .tips import KeptAngle, Tip, TipLoci, tip_loci
+
+
+@dataclass(frozen=True, eq=False)
+class PlatformObservation:
+    """An observation between base and ``body``, a link on which legs end, with its loci in the base frame at the goal
+    (m); ``back``: the body carries the camera, and the base is seen."""
+
+    seen: Observation
+    body: str
+    loci: tuple[FixedValueLocus, ...]
+    back: bool
+
+    def error(self, exact: float, goal: ClosedConfiguration) -> float:
+        """How far a point of its curves within the robot's extent can be from the exact one (m), where a point of the
+        robot is known to ``exact``."""
+        points = [each.place for each in self.loci if not each.turns] + [
+            each.through for each in self.loci if not each.turns
+        ]
+        if not points:
+            return exact
+        body = goal.pose(self.body)[:3, 3]
+        far = max(float(np.linalg.norm(point - body)) for point in points) / goal.model.length
+        spread = max(float(np.linalg.norm(each.place - each.through)) for each in self.loci if not each.turns)
+        bent = 1.0 + (goal.model.length * (1.0 + far) / spread if spread > EXACT else 0.0)
+        rounding = CHAIN_ROUNDING * max(float(np.linalg.norm(point)) for point in points)
+        return MOVED * (exact * max(1.0, far / LEVER) + rounding) * bent
+
+
+def sights(
+    decomposition: LegDecomposition, observation_model: ObservationModel, goal: ClosedConfiguration
+) -> tuple[ObservationModel, tuple[PlatformObservation, ...]]:
+    """What is measured of legs, by their labels, and the sights. Raises ``UnsupportedLocus`` where what an observation
+    leaves is not known, or what is observed is neither a leg's nor between base and platform."""
+    base, bodies = decomposition.mechanism.base, leg_ends(decomposition)
+    found, rest = list[PlatformObservation](), list[Observation]()
+    for each in observation_model.observations:
+        reference = each.seen_from or observation_model.reference
+        ends = {reference, each.link}
+        body = next(iter(ends - {base}), base)
+        if each.leg in (*decomposition.labels, "") and (each.by_segment or isinstance(each, Encoder)):
+            rest.append(each)
+        elif isinstance(each, CameraObservation | SeenAxis) and base in ends and body in bodies:
+            loci = each.loci(each.sighting(goal.pose(reference), goal.pose(each.link)))
+            if not loci or decomposition.point is not None:
+                raise UnsupportedLocus(decomposition.mechanism.name, f"what {each.kind} {each.leg} leaves is not known")
+            found.append(PlatformObservation(each, body, loci, body == reference))
+        else:
+            rest.append(_of_leg(decomposition, each))
+    return replace(observation_model, observations=tuple(rest)), tuple(found)
+
+
+def _of_leg(decomposition: LegDecomposition, seen: Observation) -> Observation:
+    """The coordinate of a leg's joint, or the direction of a leg's link, as the leg's; that of a joint inside the
+    platform as of no leg."""
+    joint = decomposition.mechanism.joints.get(seen.joint) if isinstance(seen, Encoder) else None
+    if joint is not None and set(joint.links) <= set(decomposition.platform):
+        return replace(seen, leg="")
+    for leg in decomposition.legs:
+        if (
+            seen.joint in leg.joints
+            if isinstance(seen, Encoder)
+            else isinstance(seen, Direction) and (seen.link in leg.links)
+        ):
+            return replace(seen, leg=leg.label)
+    raise UnsupportedLocus(
+        decomposition.mechanism.name, f"{seen.kind} {seen.leg} is of no leg and not between base and platform"
+    )
+
+
+def _with_sights(confined: TipLoci, seen: Sequence[PlatformObservation], goal: ClosedConfiguration) -> TipLoci:
+    """A platform with what is seen of it too. Raises ``UnsupportedLocus`` where that are no points on curves or
+    surfaces of the base: cameras on the platform beside legs that hold it, angles in a plane."""
+    turning = confined.motion in ("spatial", "oriented")
+    sides = {each.back for each in seen if not _symmetric(each)} if turning or confined.motion == "planar" else set()
+    back = sides == {True}
+    if len(sides) > 1 or (back and (confined.tips or confined.angles)):
+        raise UnsupportedLocus(goal.model.mechanism.name, "cameras on the platform, and what the base holds of it")
+    tips, angles = list(confined.tips), list(confined.angles)
+    for each in seen:
+        X, label = goal.pose(each.body), each.seen.leg
+        turned = each.back != back  # camera and what it sees change places: all is symmetric, or nothing turns
+        for locus in each.loci:
+            if locus.turns and confined.motion == "planar":
+                raise UnsupportedLocus(goal.model.mechanism.name, f"{each.seen.kind} {label} keeps an angle in a plane")
+            if locus.turns:
+                pairs = [(n, locus.place) if turned else (locus.place, n) for n in locus.normals if turning]
+                angles += [KeptAngle(label, each.body, X[:3, :3].T @ d, axis, 0.0) for d, axis in pairs]
+                continue
+            place, through = (locus.through, locus.place) if turned else (locus.place, locus.through)
+            reach = _reach(replace(locus, place=place, through=through), confined.plane)
+            if reach is not None:
+                tips.append(Tip(label, each.body, X[:3, :3].T @ (place - X[:3, 3]), reach))
+    return replace(confined, tips=tuple(tips), angles=tuple(angles), back=back)
+
+
+def all_loci(measured: MeasuredRobot, goal: ClosedConfiguration) -> tuple[TipLoci, tuple[PlatformObservation, ...]]:
+    """Where tips of legs and seen points can be, all other measurements held; and sights. Raises
+    ``UnsupportedLocus``."""
+    setup = measured.setup
+    rest, seen = sights(setup.decomposition, measured.observation_model, goal)
+    if not seen:
+        return tip_loci(setup.decomposition, rest, measured.generic_pattern, goal), ()
+    if rest.observations:
+        pattern = recognise(setup.decomposition, rest, setup.configurations, everywhere=False)
+        confined = tip_loci(setup.decomposition, rest, pattern, goal)
+    else:
+        confined = _unheld(measured, goal)
+    if confined.motion == "translations" and setup.dof < 3:
+        raise UnsupportedLocus(setup.robot.name, "its legs restrict how the platform moves")
+    return _with_sights(confined, seen, goal), seen
+
+
+def _unheld(measured: MeasuredRobot, goal: ClosedConfiguration) -> TipLoci:
+    """A platform that no leg holds. Raises ``UnsupportedLocus`` where legs restrict how it moves."""
+    decomposition, dof = measured.setup.decomposition, measured.setup.dof
+    bodies, (motion, normal) = leg_ends(decomposition), measured.moving
+    if len(bodies) > 1 or dof != {"translations": dof, "planar": 3, "spatial": 6}[motion]:
+        raise UnsupportedLocus(decomposition.mechanism.name, "its legs restrict how the platform moves")
+    return TipLoci(goal, motion, (), bodies, normal)
+
+
+def _symmetric(sight: PlatformObservation) -> bool:
+    """Whether it says the same of the camera as seen from the point: a distance, a place, angles."""
+    return all(each.turns or len(each.normals) in (0, 3) for each in sight.loci)
+
+
+def _reach(locus: FixedValueLocus, plane: Array | None) -> Reach | None:
+    """Where a point can be that moves in space, or in the plane through it with a normal; None: anywhere there."""
+    if plane is None:
+        if locus.radius is not None:
+            return Sphere(locus.through, locus.radius)
+        if len(locus.normals) == 1:
+            return Plane(locus.through, locus.normals[0])
+        return Line(locus.through, np.cross(*locus.normals)) if len(locus.normals) == 2 else Point(locus.through)
+    if locus.radius is not None:
+        v = locus.place - locus.through
+        centre = locus.through + plane * float(plane @ v)
+        return Circle(centre, plane, float(np.linalg.norm(locus.place - centre)))
+    flat = locus.normals - np.outer(locus.normals @ plane, plane)
+    _, sizes, rows = np.linalg.svd(flat)
+    rank = int(np.sum(sizes > EXACT))
+    return None if not rank else Line(locus.place, np.cross(plane, rows[0])) if rank == 1 else Point(locus.place)
+
+
+def conditions(seen: Sequence[PlatformObservation], middle: OriginAndUnit, turned: bool) -> list[PoseCondition]:
+    """The conditions on the platform's pose, counted from the goal, where a camera on it sees with moving planes; or,
+    ``turned``, on the base's as the platform sees it."""
+    found, none, up = list[PoseCondition](), np.zeros(3), np.array([0.0, 0.0, 1.0])
+    for each in seen:
+        label, back = each.seen.leg, each.back != turned
+        for locus in each.loci:
+            if locus.turns:
+                found += [
+                    AtAngle(label, none, n if back else locus.place, locus.place if back else n, float(n @ locus.place))
+                    for n in locus.normals
+                ]
+                continue
+            place, through = middle.point(locus.place), middle.point(locus.through)
+            body, rest = (through, place) if back else (place, through)
+            if locus.radius is not None:
+                found.append(
+                    OnRevolution(label, body, none, rest, up, np.array([(locus.radius / middle.size) ** 2, 0.0, -1.0]))
+                )
+            elif back and len(locus.normals) < 3:
+                found += [OnMovingPlane(label, body, n, rest, float(n @ (rest - body))) for n in locus.normals]
+            else:
+                found += [OnPlane(label, body, none, n, float(n @ rest)) for n in locus.normals]
+    return found
+
+
+Poses = Callable[[str], Array]
+
+
+def opposite(seen: Sequence[Observation], goal: ClosedConfiguration, reference: str, pose: Poses) -> tuple[str, ...]:
+    """The observations whose value at a pose of the links is not that of the goal: the opposite one."""
+    return tuple(each.leg for each in seen if not _same_value(each, each.seen_from or reference, goal, pose))
+
+
+def _same_value(seen: Observation, reference: str, goal: ClosedConfiguration, pose: Poses) -> bool:
+    try:
+        there = seen.value(pose(reference), pose(seen.link))
+    except UndefinedValue:
+        return False
+    off = seen.difference(there, seen.value(goal.pose(reference), goal.pose(seen.link)))
+    return bool(np.all(np.abs(off / goal.model.length ** np.asarray(seen.dimension)) <= SAME_SENSE))
+
+
+def behind(observed: Sequence[Observation], pose: Poses) -> tuple[str, ...] | None:
+    """The observed points and circles that are not in front of the cameras by which they are seen, by their names:
+    z ≤ 0 in the camera's frame; None where no camera with a name sees a point."""
+    points = [o for o in observed if isinstance(o, CameraObservation) and o.camera is not None and o.images_point]
+    if not points:
+        return None
+    return tuple(
+        o.leg
+        for o in points
+        if o.camera is not None
+        and transform(inverse(pose(o.camera.link) @ o.camera.pose), transform(pose(o.link), o.at))[2] <= 0.0
+    )

@@ -1,0 +1,210 @@
+"""Which solutions of a square part fit the legs that it leaves out, where more is observed than needed (theory.md 8).
+
+A solution is *excluded* where the tips of its enclosure are off what a leg can reach, in ball arithmetic. That it is a
+mode is proved only of the goal, at which all tips fit by construction: a match in floats proves nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from ...errors import GeometryAmbiguous
+from ...geometry.vectors import Array
+from ...tolerances import LOCUS, MEANT, NEAR_MODE, NO_NEAR_MODE, RANK_GAP, SAME_NEAR_MODE, TIP_ROUNDING, VANISHES
+from .constrained_platform import System
+from .loci import Sphere, length
+from .quadrics import UNIT, Conic, conditions
+from .rigid import Spatial
+from .roots import PRECISION
+
+
+def tip_rounding(system: System, at: Array) -> float:
+    """How far a tip that floats put at ``at`` (3,) can be from that of the exact input at the same pose (m)."""
+    return system.error + TIP_ROUNDING * (system.size + length(at))
+
+
+def off(system: System, k: int, at: Array, shift: float, turn: float) -> float:
+    """How far the exact tip of a leg is from ``at`` (3,) at most (m), at a pose enclosed to ``shift`` and ``turn``."""
+    return shift + turn * length(system.tips[k]) + tip_rounding(system, at)
+
+
+def meets(system: System, q: Array, goal: Array, shift: float, turn: float) -> bool:
+    """Whether the exact pose about ``q`` can be that about ``goal``: all its tips can."""
+    return all(
+        length(one - other) <= off(system, k, one, shift, turn) + tip_rounding(system, other)
+        for k, (one, other) in enumerate(zip(system.tips_at(q), system.tips_at(goal), strict=True))
+    )
+
+
+def is_excluded(system: System, q: Array, shift: float, turn: float) -> bool:
+    """Whether no pose within ``shift`` and ``turn`` of q, one of which is exact, fits all legs: a condition on a tip is
+    not zero anywhere in the ball that holds it. The worst legs are tried first."""
+    from flint import ctx
+
+    at, frame = system.tips_at(q), system.frame
+    numbers = system.balls(frame)
+    misses = np.linalg.norm(system.off(at), axis=1)
+    with ctx.workprec(PRECISION):
+        for k in np.argsort(-misses).tolist():
+            radius = off(system, k, at[k], shift, turn)
+            if misses[k] <= radius:
+                return False
+            place = numbers.vector(frame.point(at[k]), radius / frame.size * UNIT)
+            tip = Conic(place, place @ place, 1)
+            if any(not form.contains(0) for form in conditions(tip, system.curves[k], frame, numbers)):
+                return True
+    return False
+
+
+def torn(system: System, places: Mapping[int, tuple[Array, float]]) -> bool:
+    """Whether tips of a rigid platform, at ``places`` (3,) known to a distance (m), are farther apart or nearer than
+    they are on it: no pose brings them there."""
+    from flint import ctx
+
+    frame = system.frame
+    numbers = system.balls(frame)
+    with ctx.workprec(PRECISION):
+        tips = {
+            k: (
+                numbers.vector(frame.point(at), (miss + tip_rounding(system, at)) / frame.size * UNIT),
+                numbers.vector(system.tips[k] / frame.size),
+            )
+            for k, (at, miss) in places.items()
+        }
+        arms = [(at - to, b - c) for (at, b), (to, c) in combinations(tips.values(), 2)]
+        return any(not (arm @ arm - own @ own).contains(0) for arm, own in arms)
+
+
+def words(goal: bool, lost: bool, fitting: Sequence[float], out: int, open_: int) -> str:
+    """What the legs say of all solutions: whether one is the goal, or it is ``lost`` among them, the residuals of those
+    that fit, how many are excluded and how many are not decided."""
+    parts = [f"{'none' if lost else 'one'} is the goal, at which all legs fit by construction"] if goal else []
+    if fitting:
+        parts.append(
+            f"{len(fitting)} fit{'s' * (len(fitting) == 1)} all legs to {max(fitting):.1e} of the robot's "
+            "size, which does not prove it"
+        )
+    parts.append(f"{out} excluded by the legs in interval arithmetic" if out else "none excluded")
+    if open_:
+        parts.append(f"{open_} neither excluded nor found to fit")
+    return ", ".join(parts)
+
+
+STARTS = 40
+"""Random poses from which a pose of a continuum is looked for."""
+
+
+def residual(system: System, q: Array) -> float:
+    """The largest distance of a tip from its curve, in sizes of the mechanism."""
+    return system.residual(system.tips_at(q))
+
+
+def stationary(system: System, starts: Sequence[Array], known: Sequence[Array]) -> list[Array]:
+    """Poses with a small residual that is stationary, nearest to ``starts``, without those ``known``, best first."""
+    found: list[tuple[float, Array]] = []
+    seen = [np.asarray(q) for q in known]
+    for start in starts:
+        if residual(system, start) > NO_NEAR_MODE:
+            continue
+        q = _least_misses(system, start)
+        miss = residual(system, q)
+        if miss <= NEAR_MODE and all(_apart(system, q, other) > SAME_NEAR_MODE for other in seen):
+            found.append((miss, q))
+            seen.append(q)
+    return [q for _, q in sorted(found, key=lambda each: each[0])]
+
+
+def dimension(system: System) -> int | None:
+    """The largest dimension of the real poses about one that closes; None where none is found."""
+    rng = np.random.default_rng(0)
+    found = []
+    for _ in range(STARTS):
+        q = _least_misses(system, system.somewhere(rng))
+        if residual(system, q) <= VANISHES:
+            values = np.linalg.svd(_slopes(system, q), compute_uv=False)
+            found.append(int(len(q) - np.sum(values > np.sqrt(LOCUS) * values[0])))
+    return max(found, default=None)
+
+
+def _least_misses(system: System, start: Array) -> Array:
+    """The pose of least squared misses next to a start."""
+    from scipy.optimize import least_squares
+
+    result = least_squares(lambda q: system.misses(q).ravel() / system.size, start, xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    return np.asarray(result.x)
+
+
+def _slopes(system: System, q: Array, step: float = 1e-6) -> Array:
+    """Central differences of the misses; shape (3 legs, coordinates)."""
+    columns = [(system.misses(q + e) - system.misses(q - e)).ravel() / (2 * step) for e in step * np.eye(len(q))]
+    return np.column_stack(columns)
+
+
+def _apart(system: System, one: Array, other: Array) -> float:
+    """How far two poses, or the tips of two bodies, are from each other (sizes, pure numbers)."""
+    X, Y = system.pose(one), system.pose(other)
+    moved = (X[:3, 3] - Y[:3, 3], system.misses(one) - system.misses(other))
+    turned = float(np.abs(X[:3, :3] - Y[:3, :3]).max())
+    return max(max(float(np.abs(each).max()) for each in moved) / system.size, turned)
+
+
+@dataclass(frozen=True)
+class SnappedPoints:
+    """Joint centres of some legs (their places among all) that were made one: on the ``platform`` or the ``base``, and
+    how far the one that was farthest from the others was (m)."""
+
+    where: str
+    legs: tuple[int, ...]
+    defect: float
+
+
+def snap_centres(system: System) -> tuple[System, tuple[SnappedPoints, ...]]:
+    """A system with what is meant made exact, and what that is; its error grows by what was moved.
+
+    Coinciding counts as meant where the largest distance accepted (at most ``MEANT`` sizes) is below the smallest one
+    rejected by ``RANK_GAP``; raises ``GeometryAmbiguous`` where it lies in between.
+    """
+    if system.as_written or not isinstance(system, Spatial):
+        return system, ()
+    spheres = [k for k, curve in enumerate(system.curves) if isinstance(curve, Sphere)]
+    points = {"platform": dict(enumerate(system.points)), "base": {k: system.curves[k].centre for k in spheres}}
+    apart = [
+        (float(np.linalg.norm(at[i] - at[j])), where, i, j)
+        for where, at in points.items()
+        for i, j in combinations(at, 2)
+    ]
+    accepted = [each for each in apart if each[0] <= MEANT * system.size]
+    largest = max((each[0] for each in accepted), default=0.0)
+    smallest = min((each[0] for each in apart if each not in accepted), default=np.inf)
+    if largest * RANK_GAP > smallest:
+        raise GeometryAmbiguous(
+            "joint centres that may be meant to be one", largest / system.size, smallest / system.size, RANK_GAP
+        )
+    if largest == 0.0:
+        return system, ()
+    tips, curves, told = system.tips.copy(), list(system.curves), []
+    for where, at in points.items():
+        for group in _groups([(i, j) for _, side, i, j in accepted if side == where]):
+            middle = np.mean([at[k] for k in group], axis=0)
+            defect = max(d for d, side, i, _ in accepted if side == where and i in group)
+            if defect > 0:
+                told.append(SnappedPoints(where, group, defect))
+            for k in group:
+                if where == "platform":
+                    tips[k] = middle
+                else:
+                    curves[k] = replace(curves[k], centre=middle)
+    return replace(system, tips=tips, curves=tuple(curves), error=system.error + largest), tuple(told)
+
+
+def _groups(pairs: list[tuple[int, int]]) -> list[tuple[int, ...]]:
+    """Those that are joined by pairs, together."""
+    groups: list[set[int]] = []
+    for pair in pairs:
+        joined = [group for group in groups if group & set(pair)]
+        groups = [group for group in groups if group not in joined] + [set(pair).union(*joined)]
+    return [tuple(sorted(group)) for group in groups]

@@ -1,0 +1,130 @@
+"""One question over many robots, legs and poses, in several processes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable
+from contextlib import closing
+from functools import partial
+from inspect import signature
+from itertools import product
+from math import ceil
+from typing import Any
+
+from ..errors import BadRequest, HrsynthError
+from ..mechanism.pose import AskedPose, PoseLike, asked_poses
+from ..processes import run_shared
+from ..progress import report
+from ..results import Result, brief
+from .observed import LegsLike, RobotLike, as_names, as_robot
+
+PARTS_EACH = 2
+"""Parts of the work for each process, at least, where there are so many questions."""
+RAISE, KEEP = "raise", "keep"
+"""What becomes of a question that cannot be answered: it ends all, or its error takes the place of the answer."""
+
+Given = dict[str, Any]
+"""The arguments of one question."""
+
+
+def map_robots(
+    observation_model: str | Callable[..., Any],
+    robots: RobotLike | Iterable[RobotLike],
+    *,
+    poses: PoseLike | Iterable[PoseLike] | None = None,
+    legs: Iterable[LegsLike] | None = None,
+    jobs: int | None = None,
+    errors: str = RAISE,
+    **options: Any,
+) -> list[Any]:
+    """The answers to one question about each of the ``robots``, with each of the sets of ``legs``, at each of the
+    ``poses``: in this order, poses fastest, whichever is finished first.
+
+    ``question`` is a public function or its name, or your own function with the same parameters: it gets a pose as
+    ``at``, or as ``goal`` if it has no ``at``, and a set of legs as ``observe``; ``options`` are the same for all.
+    There are ``jobs`` processes, by default one per core; with 1 everything is done in this process. A robot's samples
+    are drawn once in each process that is asked about it. ``errors`` is ``raise``, or ``keep``: an error of a question,
+    or of reading its robot (an ``HrsynthError``), then takes the place of the answer. The error says what was asked.
+
+    Raises ``BadRequest``, and what the question raises.
+
+    >>> hrsynth.map_robots("check", ["3rrr_m1"], poses=["x=0,phi=0", "x=0.01,phi=0"], legs=["1,2", "all"], jobs=1)[0]
+    <Check: 3rrr_m1, watching 1, 2: x=0,y=0,z=0,phi=0deg regular, shows 2 of 3>
+    """
+    function: Callable[..., Any] = _function(observation_model)
+    if errors not in (RAISE, KEEP):
+        raise BadRequest("errors", errors, (RAISE, KEEP))
+    if jobs is not None and (isinstance(jobs, bool) or not isinstance(jobs, int) or jobs < 1):
+        raise BadRequest("number of processes", jobs, "1 or more")
+    several: Any = [robots] if isinstance(robots, str | os.PathLike) or not isinstance(robots, Iterable) else robots
+    every = [_read(each, errors) for each in several]
+    sets = [legs] if isinstance(legs, str) else legs
+    watched: list[Given] = [{}] if sets is None else [{"observe": as_names(each)} for each in sets]
+    asked: list[Given] = [{}] if poses is None else [{_place(function): each} for each in asked_poses(poses)]
+    groups = [{"robot": robot, **seen, **options} for robot, seen in product(every, watched)]
+    workers = jobs or os.cpu_count() or 1
+    size = max(1, ceil(len(asked) / ceil(PARTS_EACH * workers / max(1, len(groups)))))
+    parts = [[{**group, **at} for at in asked[k : k + size]] for group in groups for k in range(0, len(asked), size)]
+    answers: list[Any] = []
+    with closing(
+        run_shared([partial(_answer_part, function, errors, part) for part in parts], min(workers, len(parts)))
+    ) as done:
+        for found in done:
+            answers += found
+            report("questions")
+            if errors == RAISE and isinstance(answers[-1], HrsynthError):
+                raise answers[-1]
+    return answers
+
+
+def _read(given: RobotLike, errors: str) -> RobotLike:
+    """The robot, read once; where errors are kept, one that cannot be read as it was given."""
+    try:
+        return as_robot(given)
+    except HrsynthError:
+        if errors == RAISE:
+            raise
+        return given
+
+
+def _function(observation_model: str | Callable[..., Any]) -> Callable[..., Any]:
+    if callable(observation_model):
+        return observation_model
+    try:
+        found = Result.public(observation_model)
+    except (AttributeError, TypeError):
+        found = None
+    if not (callable(found) and "robot" in signature(found).parameters):
+        raise BadRequest(
+            "a question", observation_model, "a function of hrsynth that takes a robot, or its name, such as check"
+        )
+    return found
+
+
+def _answer_part(function: Callable[..., Any], errors: str, part: list[Given]) -> list[Any]:
+    """The answers of a part, to its first error where that ends all; the error is told what was asked."""
+    found: list[Any] = []
+    for given in part:
+        try:
+            found.append(function(**{**given, "robot": as_robot(given["robot"])}))
+        except Exception as error:
+            error.add_note("asked: " + ", ".join(f"{name} {_describe(value)}" for name, value in given.items()))
+            if not isinstance(error, HrsynthError):
+                raise
+            found.append(error)
+            if errors == RAISE:
+                break
+    return found
+
+
+def _describe(value: Any) -> str:
+    return str(value) if isinstance(value, AskedPose | tuple) else brief(value)
+
+
+def _place(function: Callable[..., Any]) -> str:
+    """The parameter that takes a pose."""
+    known = signature(function).parameters
+    for name in ("at", "goal"):
+        if name in known:
+            return name
+    raise BadRequest(f"poses for {function.__name__}", "no parameter for a pose", "a question with at or goal")

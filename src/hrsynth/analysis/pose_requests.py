@@ -1,0 +1,171 @@
+"""The configurations of the poses that a question names: by parts of the pose, by coordinates of joints, or by the
+number of a mode."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from ..batch.pose_continuation import reach
+from ..errors import BadRequest, HrsynthError, PoseNotReached
+from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.joint_coordinates import reach_joints
+from ..kinematics.locked_twists import rezero
+from ..mechanism.model import Mechanism
+from ..mechanism.pose import AskedPose, JointPose, ModeNumber, Pose, PoseLike, asked_pose
+from ..options import require_range
+from ..results import with_spelling
+from ..tolerances import AS_PRINTED
+from .observed import SAMPLES, CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike, as_robot
+
+if TYPE_CHECKING:
+    from .modes.modes import AssemblyModes
+
+
+@with_spelling
+def observe(
+    robot: RobotLike,
+    legs: LegsLike = None,
+    camera: CameraLike = None,
+    *,
+    see: SeeLike = None,
+    at: PoseLike | None = None,
+    samples: int = SAMPLES,
+    seed: int = 0,
+) -> ObservedRobot:
+    """A robot with what is watched of it, its normal form and samples of its motion: the starting point of every
+    question.
+
+    ``legs`` holds leg labels or link names (in a string, separated by commas); ``["all"]`` means all legs, None
+    what the robot itself observes, else all legs at their default segments. ``camera`` names the link that carries
+    the camera; ``NAME=LINK@x,y,z/r,p,y`` is a further, named one, in the link's frame (x right, y down, z ahead;
+    metres, radians or ``deg``). ``see`` holds other observations, ``[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius``
+    (:mod:`hrsynth.mechanism.observations`), which replace all legs if ``legs`` is None. ``at`` is a pose that
+    replaces the zero configuration: on the same branch if that reaches the pose, otherwise in another operation
+    mode that was met; coordinates of joints or motors (``motors:0.1,0.2``); or a mode of the zero configuration with
+    what is watched, ``mode:2``, at which ``modes`` found the robot assembled.
+
+    Raises ``BadRequest`` for unknown labels, links, parts of a pose and modes, ``PoseNotReached``.
+
+    >>> robot = hrsynth.observe("3rrr_m1", [1, 2])
+    >>> robot
+    <ObservedRobot: 3rrr_m1, watching 1, 2>
+    >>> hrsynth.derive(robot).verdict == "controllable"
+    False
+    """
+    robot = as_robot(robot)
+    require_range("seed", seed, "an integer", 0)
+    if at is None:
+        return ObservedRobot.of(robot, legs, camera, see=see, samples=samples, seed=seed)
+    if isinstance(robot, ObservedRobot):
+        raise BadRequest(
+            f"{robot.headline()}: what is watched is given twice", str(at), "nothing besides an observed robot"
+        )
+    require_platform(robot, at)
+    asked = asked_pose(at)
+    if isinstance(asked, Pose):
+        start = _start_at(ObservedRobot.of(robot, seed=seed), asked)
+    else:
+        (start,) = configurations_at(ObservedRobot.of(robot, legs, camera, see=see, seed=seed), [asked])
+    return ObservedRobot.of(replace(rezero(start), file=robot.file), legs, camera, see=see, samples=samples, seed=seed)
+
+
+def require_platform(robot: Mechanism, where: object) -> None:
+    """Refuses the pose or grid ``where`` of a formation: it would be that of its first body, the others staying."""
+    if robot.formation:
+        raise BadRequest(
+            f"{robot.name}: a pose belongs to one platform, and this is a formation",
+            str(where),
+            f"nothing: {', '.join(robot.bodies)} stand where the file has them (--platform LINK makes one "
+            "the platform)",
+        )
+
+
+def _start_at(setup: ObservedRobot, wanted: Pose) -> ClosedConfiguration:
+    """The configuration at a pose, on the branch of the zero configuration or in another operation mode."""
+    drawn = setup.all_samples
+    refused: HrsynthError | None = None
+    for start in (drawn.start, *(mode.at for mode in drawn.other_modes)):
+        try:
+            return reach(start, drawn.observation_model, wanted)
+        except (BadRequest, PoseNotReached) as error:
+            refused = refused or error
+    assert refused is not None
+    raise refused
+
+
+def configurations_at(
+    setup: ObservedRobot, poses: Sequence[AskedPose], by_modes: bool = False
+) -> list[ClosedConfiguration]:
+    """The robot at each of the poses, as :func:`asked_at`; raises ``PoseNotReached`` for the first not reached."""
+    found = asked_at(setup, poses, by_modes)
+    for each in found:
+        if isinstance(each, PoseNotReached):
+            raise each
+    return [each for each in found if isinstance(each, ClosedConfiguration)]
+
+
+def asked_at(
+    setup: ObservedRobot, poses: Sequence[AskedPose], by_modes: bool = False
+) -> list[ClosedConfiguration | PoseNotReached]:
+    """The robot at each of the poses, or why it does not get there. ``mode:3`` is the third mode, with the directions
+    that are watched, of the first pose among these that is given by its parts (of the zero configuration where none
+    is), as ``modes`` lists them; with ``by_modes`` of the first that is reached, and a pose to which no small steps
+    lead is that of such a mode, where one is there.
+
+    Raises ``BadRequest`` for parts of a pose that the platform cannot change and for modes that there are not.
+    """
+    if not poses:
+        return []
+    require_platform(setup.robot, poses[0])
+    all_samples, motion = setup.all_samples, setup.motion
+    found: dict[AskedPose, ClosedConfiguration | PoseNotReached] = {}
+    for each in poses:
+        if not isinstance(each, ModeNumber):
+            try:
+                if isinstance(each, JointPose):
+                    found[each] = reach_joints(all_samples.start, motion, each)
+                else:
+                    found[each] = reach(all_samples.start, all_samples.observation_model, each, motion)
+            except PoseNotReached as error:
+                found[each] = error
+    reached = [at for at in found.values() if isinstance(at, ClosedConfiguration)]
+    about = next(iter(reached if by_modes else found.values()), all_samples.start)
+    unreached = {each: at for each, at in found.items() if isinstance(at, PoseNotReached) and isinstance(each, Pose)}
+    if isinstance(about, PoseNotReached):
+        reason = f"it would be a mode at {about.pose}, which is not reached"
+        return [
+            found.get(each) or PoseNotReached(about.robot, str(each), 0.0, about.last, reason=reason) for each in poses
+        ]
+    if len(found) < len(set(poses)) or (by_modes and unreached):
+        from .modes.modes import at_mode, modes
+
+        listed = modes(setup, at=about)
+        for each in poses:
+            try:
+                if isinstance(each, ModeNumber):
+                    found[each] = at_mode(listed, each)
+                elif by_modes and isinstance(each, Pose) and each in unreached:
+                    found[each] = _assembled_mode(listed, each, unreached[each])
+            except PoseNotReached as error:
+                found[each] = error
+    return [found[each] for each in poses]
+
+
+def _assembled_mode(listed: AssemblyModes, pose: Pose, refused: PoseNotReached) -> ClosedConfiguration:
+    """The robot at the one mode with this pose at which it was found assembled; raises ``refused`` if there is none."""
+    from .modes.modes import at_mode
+
+    motion, model = listed.setup.motion, listed.goal.model
+    wanted = motion.goal(pose, listed.setup.robot.name)
+    met = [
+        number
+        for number, mode in enumerate(listed.modes, 1)
+        if mode.configuration is not None
+        and mode.reachable
+        and wanted.is_met(mode.configuration.pose(motion.link), AS_PRINTED * max(1.0, model.length))
+    ]
+    if len(met) != 1:
+        raise refused
+    return at_mode(listed, ModeNumber(met[0]))

@@ -1,0 +1,147 @@
+"""Kinds of singularities: Zlatanov's six counts against their generic values, and redundant constraints of loops."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from ..geometry.ranks import Rank, range_basis, rank_of
+from ..geometry.vectors import Array
+from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.velocity_relation import VelocityRelation
+from ..records import Record
+from ..tolerances import RANK_GAP
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Dimensions at one configuration: mobility, ρ, its projections on t and on the rates, RO, RI."""
+
+    mobility: int
+    relation: int
+    dof: int
+    seen: int
+    unseen: int
+    unexplained: int
+
+    @classmethod
+    def of(cls, found: VelocityRelation) -> Counts:
+        """The counts of a relation."""
+        seen = range_basis(found.rates, 1.0)[1].value
+        return cls(found.mobility, found.dimension, found.dof.value, seen, found.RO.value, found.RI)
+
+
+def generic(counts: Sequence[Counts]) -> Counts:
+    """The most frequent counts; of equally frequent ones those of the smallest mobility, then of the highest rank."""
+    often = Counter(counts)
+    return max(often, key=lambda each: (often[each], -each.mobility, each.relation, each.seen))
+
+
+def gap_of(found: VelocityRelation) -> float:
+    """The smallest gap of all ranks that the counts rest on."""
+    return min(found.gap, found.dof.gap, found.RO.gap, range_basis(found.rates, 1.0)[1].gap)
+
+
+@dataclass(frozen=True)
+class SingularityIndices(Record, all_recorded=True):
+    """Zlatanov's six: RI, RO, RPM, IIM as excess, II, IO as deficit over the generic values.
+
+    RO = dim {t : (t, 0) ∈ ρ}, RI = dim {u̇ : (0, u̇) ∈ ρ}, RPM = dim {q̇ : t = 0, u̇ = 0}, IIM = mobility,
+    IO = dim proj_t ρ, II = dim proj_u̇ ρ. Then IO = RI + RPM − IIM and II = RO + RPM − IIM.
+    """
+
+    RI: int
+    RO: int
+    II: int
+    IO: int
+    RPM: int
+    IIM: int
+
+    @classmethod
+    def of(cls, here: Counts, usual: Counts) -> SingularityIndices:
+        """The counts here against the usual ones."""
+        passive = (here.mobility - here.relation) - (usual.mobility - usual.relation)
+        return cls(
+            RI=here.unexplained - usual.unexplained,
+            RO=here.unseen - usual.unseen,
+            II=usual.seen - here.seen,
+            IO=usual.dof - here.dof,
+            RPM=passive,
+            IIM=here.mobility - usual.mobility,
+        )
+
+    @property
+    def type1(self) -> bool:
+        """What is measured moves while the platform rests (RI > 0)."""
+        return self.RI > 0
+
+    @property
+    def type2(self) -> bool:
+        """The platform moves while what is measured rests (RO > 0)."""
+        return self.RO > 0
+
+    @property
+    def type3(self) -> bool:
+        """Both."""
+        return self.type1 and self.type2
+
+
+def interaction_matrix(found: VelocityRelation) -> Array | None:
+    """Mᵀ (rates, dof) on the basis ``found.twists`` of the feasible twists (MMT eq. 7; lengths in characteristic
+    lengths); None where it does not exist."""
+    if found.RI:
+        return None
+    return found.rates @ np.asarray(np.linalg.lstsq(found.twist_part, found.twists, rcond=None)[0])
+
+
+@dataclass(frozen=True)
+class Redundancy(Record, all_recorded=True):
+    """``rows`` constraints of the loop that the file calls ``loop`` repeat what earlier loops say already; at
+    generic configurations where ``generic``."""
+
+    loop: str
+    rows: int
+    generic: bool
+
+
+Rows = tuple[tuple[str, int], ...]
+"""Each loop's name with its number of redundant rows, in the order of the twin's loops."""
+
+
+def redundant_rows(at: ClosedConfiguration) -> Rows:
+    """Redundant rows of each loop, counted greedily in the order of ``PinocchioModel.loops``: all rows of a loop but
+    those by which it raises the rank of the loops before it. Empty where a rank is not decided."""
+    J = at.model.jacobian(at.q)
+    names, sizes = at.model.blocks
+    scale = float(np.linalg.norm(J, 2)) if J.size else 1.0
+    ranks = [Rank(0, np.inf)]
+    ranks += [rank_of(np.asarray(np.linalg.svd(J[:end], compute_uv=False)), scale) for end in np.cumsum(sizes)]
+    if min(rank.gap for rank in ranks) < RANK_GAP:
+        return ()
+    return tuple(
+        (name, size - (after.value - before.value))
+        for name, size, (before, after) in zip(names, sizes, pairwise(ranks), strict=True)
+    )
+
+
+def usual_rows(configurations: Iterable[ClosedConfiguration]) -> Rows:
+    """The redundant rows of each loop at most of the configurations."""
+    found = Counter(rows for at in configurations if (rows := redundant_rows(at)))
+    return max(found, key=lambda rows: found[rows], default=())
+
+
+def surplus(here: Rows, usual: Rows) -> Rows:
+    """The rows that are redundant here and not in general: as many as the loops lose rank, each with the loop from
+    which on the loss stays."""
+    more = np.cumsum([count - often for (_, count), (_, often) in zip(here, usual, strict=False)])
+    lasting = np.maximum(np.minimum.accumulate(more[::-1])[::-1], 0)
+    return tuple((name, int(count)) for (name, _), count in zip(here, np.diff(lasting, prepend=0), strict=False))
+
+
+def list_redundant(rows: Rows, *, generic: bool) -> tuple[Redundancy, ...]:
+    """The loops with redundant rows."""
+    return tuple(Redundancy(name, count, generic) for name, count in rows if count > 0)

@@ -1,0 +1,299 @@
+"""From platform poses to closed configurations: the poses of all links by leg, then the joints' coordinates.
+
+Each leg's links start where its subproblem puts them and are closed by a few Gauss-Newton steps, all poses abreast;
+what comes out counts only where Pinocchio's own loops are closed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import takewhile
+
+import numpy as np
+
+from ..budgets import FAST_DIRECTIONS
+from ..closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, PlatformDirection
+from ..errors import NotSampled
+from ..geometry.so3 import between, exponential, quaternions
+from ..geometry.vectors import Array, frozen, hat, inverse
+from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.pinocchio_model import PinocchioModel, across
+from ..mechanism import Joint, JointType, Mechanism
+from ..mechanism.legs import Leg, LegDecomposition
+from ..mechanism.observations.direction import Direction
+from ..mechanism.screws import elementary
+from ..results import Value
+from ..tolerances import CLOSED
+from .engine import Batch, Flags
+from .iterative_leg import IterativeLeg
+from .program import CHUNK
+
+STEP = 0.15
+"""Length of a step of a walk (characteristic lengths, radians)."""
+CLOSING = 12
+"""Gauss-Newton steps from where the subproblem puts a leg's links."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ConfigurationBuilder(Value):
+    """A batch whose platform poses can be made closed configurations of ``twin``."""
+
+    batch: Batch
+    model: PinocchioModel
+    decomposition: LegDecomposition
+    seen: Mapping[str, Direction]
+    legs: Mapping[str, IterativeLeg]
+
+    @classmethod
+    def of(
+        cls, batch: Batch, model: PinocchioModel, decomposition: LegDecomposition, observations: Sequence[Direction]
+    ) -> ConfigurationBuilder | None:
+        """None where a leg is no known subproblem, or a link belongs neither to a leg nor to the platform."""
+        mechanism = decomposition.mechanism
+        placed = {mechanism.base, *batch.coordinates.links, *(name for leg in decomposition.legs for name in leg.links)}
+        known = all(isinstance(leg, ClosedFormLeg) for leg in batch.legs.values())
+        if not (known and batch.coordinates.constant and placed == set(mechanism.links)) or any(
+            joint.type is JointType.FREE for joint in mechanism.joints.values()
+        ):
+            return None
+        seen = {o.leg: o for o in observations}
+        legs = {leg.label: IterativeLeg.of(mechanism, leg, seen[leg.label], None) for leg in decomposition.legs}
+        return cls(batch, model, decomposition, seen, legs)
+
+    def configurations(self, X: Array) -> list[ClosedConfiguration | None]:
+        """The closed configurations at platform poses X (n, 4, 4), None where there is none in the working mode of the
+        zero configuration."""
+        found: list[ClosedConfiguration | None] = []
+        for start in range(0, len(X), CHUNK):
+            frames, reached = self.frames(X[start : start + CHUNK])
+            q = frozen(coordinates(self.model, frames))
+            for here, there in zip(q, reached, strict=True):
+                residual = float(np.linalg.norm(self.model.residual(here))) if there else np.inf
+                found.append(ClosedConfiguration(self.model, here, residual) if residual <= CLOSED else None)
+        return found
+
+    def random_walk(self, count: int, seed: int = 0, steps: int = 40) -> Iterator[ClosedConfiguration]:
+        """``count`` random configurations: walks of up to ``steps`` small steps of the platform from its home, side by
+        side; a walk ends where the robot does not reach on, or comes near to a Type 1 singularity."""
+        rng, batch = np.random.default_rng(seed), self.batch
+        limit = FAST_DIRECTIONS * float(batch.evaluate(batch.home[None]).singular_values[0, 0])
+        given = failed = 0
+        walks = -(-count // steps)
+        while given < count:
+            walks *= 2
+            ways = self._walks(rng, walks, steps, limit)
+            failed += sum(len(way) < steps for way in ways)
+            met = self.configurations(np.concatenate(ways)) if any(map(len, ways)) else []
+            for way in np.split(np.arange(len(met)), np.cumsum([len(way) for way in ways])[:-1]):
+                for at in takewhile(lambda at: at is not None, (met[i] for i in way)):
+                    assert at is not None
+                    yield at
+                    given += 1
+                    if given == count:
+                        return
+            if failed > 10 * (given + walks + 10):
+                raise NotSampled(self.model.mechanism.name, given, count, given + failed)
+
+    def _walks(self, rng: np.random.Generator, walks: int, steps: int, limit: float) -> list[Array]:
+        """The platform poses (k, 4, 4) of each walk."""
+        coordinates, length = self.batch.coordinates, self.batch.length
+        ways: list[list[Array]] = [[] for _ in range(walks)]
+        X = np.repeat(self.batch.home[None], walks, axis=0)
+        velocity = np.zeros((walks, coordinates.dof))
+        live = np.arange(walks)
+        for _ in range(steps):
+            velocity += rng.normal(size=velocity.shape) / 2
+            velocity /= np.linalg.norm(velocity, axis=1, keepdims=True)
+            shift, spin = np.split(STEP * velocity, [coordinates.translations.shape[1]], axis=1)
+            p, R = coordinates.place(X)
+            X = X.copy()
+            X[:, :3, :3] = exponential(spin @ coordinates.rotations.T) @ R
+            X[:, :3, 3] = p + length * (shift @ coordinates.translations.T) - X[:, :3, :3] @ coordinates.point
+            found = self.batch.evaluate(X, compiled=False)
+            kept = np.flatnonzero(found.reached & ~(found.singular_values[:, 0] > limit))
+            X, velocity, live = X[kept], velocity[kept], live[kept]
+            for walk, pose in zip(live, X, strict=True):
+                ways[walk].append(pose)
+        return [np.array(way).reshape(-1, 4, 4) for way in ways]
+
+    def frames(self, X: Array) -> tuple[dict[str, Array], Flags]:
+        """Poses (n, 4, 4) of all links, metres, and where the legs are closed (n,)."""
+        batch, mechanism = self.batch, self.decomposition.mechanism
+        p, R = batch.coordinates.place(X)
+        frames = {mechanism.base: np.broadcast_to(mechanism.links[mechanism.base].pose, (len(X), 4, 4))}
+        frames |= {name: link.poses(p, R) for name, link in batch.coordinates.links.items()}
+        reached = np.ones(len(X), dtype=bool)
+        for leg in self.decomposition.legs:
+            chain, form = self.legs[leg.label], batch.legs[leg.label]
+            assert isinstance(form, ClosedFormLeg)
+            guess, there = self._guess(leg, form, frames, p, R)
+            state = np.stack([guess[name] for name in chain.links], axis=1)
+            state[:, :, :3, 3] /= batch.length
+            state[~there] = chain.zero
+            end = state[:, 1].copy()
+            state, residual = chain.close(state, end, CLOSING)
+            reached &= there & (residual <= CLOSED)
+            state[:, :, :3, 3] *= batch.length
+            frames.update({name: state[:, i] for i, name in enumerate(chain.links) if name in leg.links})
+        return frames, reached
+
+    def _guess(
+        self, leg: Leg, form: ClosedFormLeg, frames: Mapping[str, Array], p: Array, R: Array
+    ) -> tuple[dict[str, Array], Flags]:
+        """Where the leg's links start: its first link on its circle or line, the others turned as the observed one."""
+        mechanism, seen = self.decomposition.mechanism, self.seen[leg.label]
+        n = len(p)
+        zero = mechanism.links[seen.link].pose[:3, :3] @ seen.direction
+        with np.errstate(invalid="ignore", divide="ignore"):
+            u, there = form.direction(p, R)
+            ends = form.ends(p, R)
+        if not isinstance(form, PlatformDirection):
+            u = np.where(there[:, None], u, zero)
+        first = _first(form, ends, there)
+        turn = exponential(between(zero, u))
+        guess = {name: frames[name] for name in (mechanism.base, leg.platform_link)}
+        for name in _outwards(mechanism, leg, form.crank):
+            pose = mechanism.links[name].pose
+            if name == form.crank:
+                guess[name] = first @ pose
+                continue
+            joint, held = _hold(mechanism, leg, name, guess)
+            moved = guess[held] @ inverse(mechanism.links[held].pose)
+            centre = moved[:, :3, :3] @ joint.point + moved[:, :3, 3]
+            guess[name] = np.tile(np.eye(4), (n, 1, 1))
+            guess[name][:, :3, :3] = turn @ pose[:3, :3]
+            guess[name][:, :3, 3] = centre + turn @ (pose[:3, 3] - joint.point)
+        return guess, there
+
+
+def _first(form: ClosedFormLeg, B: Array | None, there: Flags) -> Array:
+    """The displacement (n, 4, 4) that brings the point of the leg's first link to B."""
+    X = np.tile(np.eye(4), (len(there), 1, 1))
+    if isinstance(form, OnRail) and B is not None:
+        X[:, :3, 3] = B - form.place
+    elif isinstance(form, OnCrank | PlatformDirection) and B is not None:
+        a, start, arm = form.pivot, form.place - form.centre, B - form.centre
+        angle = np.arctan2(arm @ np.cross(a, start), arm @ start)
+        X[:, :3, :3] = exponential(angle[:, None] * a)
+        X[:, :3, 3] = form.centre - X[:, :3, :3] @ form.centre
+    X[~there] = np.eye(4)
+    return X
+
+
+def _outwards(mechanism: Mechanism, leg: Leg, crank: str) -> list[str]:
+    """The leg's links, each after one that it hangs on."""
+    order: list[str] = [crank] if crank in leg.links else []
+    rest = [name for name in leg.links if name not in order]
+    while rest:
+        known = {mechanism.base, leg.platform_link, *order}
+        chosen = next(name for name in rest if any(joint.other(name) in known for joint in mechanism.joints_of(name)))
+        order.append(chosen)
+        rest.remove(chosen)
+    return order
+
+
+def _hold(mechanism: Mechanism, leg: Leg, name: str, placed: Mapping[str, Array]) -> tuple[Joint, str]:
+    """The joint by which a link is placed, and the link beyond it: the platform's before others, turning ones first."""
+    joints = [joint for joint in mechanism.joints_of(name) if joint.other(name) in placed]
+    best = min(joints, key=lambda joint: (joint.type.slides, joint.other(name) != leg.platform_link))
+    return best, best.other(name)
+
+
+def coordinates(model: PinocchioModel, frames: Mapping[str, Array]) -> Array:
+    """The twin's q (n, nq) for poses of all links (n, 4, 4), metres."""
+    moved = _displacements(model, frames)
+    n = len(next(iter(frames.values())))
+    q = np.repeat(model.q0[None], n, axis=0)
+    for joint, parent, names in model.parts():
+        turned = joint if joint.predecessor == parent else joint.turned()
+        A, B = moved[turned.predecessor], moved[turned.successor]
+        R = A[:, :3, :3].transpose(0, 2, 1) @ B[:, :3, :3]
+        centre = B[:, :3, :3] @ joint.point + B[:, :3, 3] - A[:, :3, 3]
+        shift = np.einsum("nji,nj->ni", A[:, :3, :3], centre) - joint.point
+        values = _coordinates(turned, R, shift / model.length)
+        for start, value in zip((model.start(name) for name in names), values, strict=True):
+            q[:, start : start + value.shape[1]] = value
+    return q
+
+
+def rates(model: PinocchioModel, frames: Mapping[str, Array], link: str) -> tuple[Array, Array]:
+    """What the twin's velocities do at closed poses of all links (n, 4, 4), metres: how fast the loops open
+    (n, rows, nv), and the twists (n, 6, nv) of a link at the base's origin; characteristic lengths and radians."""
+    moved, (tree, cuts) = _displacements(model, frames), model.spanned
+    screws, rows = np.zeros((len(moved[link]), 6, model.nv)), [np.zeros((len(moved[link]), 0, model.nv))]
+    moves = {model.mechanism.base: np.zeros(model.nv)}
+
+    def beyond(joint: Joint, parent: str) -> Array:
+        """Which coordinates move what is beyond a joint, whose screws are added."""
+        found, places = moves[parent].copy(), sorted(model.coordinates.get(joint.name, ()))
+        if places:
+            own = joint if joint.predecessor == parent else joint.turned()
+            found[places] = 1.0
+            screws[:, :, places[0] : places[-1] + 1] = _screws(
+                own, moved[parent], moved[joint.other(parent)], model.length
+            )
+        return found
+
+    for joint in tree:
+        parent = next(name for name in joint.links if name in moves)
+        moves[joint.other(parent)] = beyond(joint, parent)
+    ends = [beyond(joint, joint.predecessor) - moves[joint.successor] for joint in cuts]
+    for joint, signs in zip(cuts, ends, strict=True):
+        gap = screws * signs
+        if joint.type is JointType.SPHERICAL:
+            gap = gap[:, :3] - hat(_centre(joint, moved[joint.predecessor]) / model.length) @ gap[:, 3:]
+        rows.append(gap)
+    return np.concatenate(rows, axis=1), screws * moves[link]
+
+
+def _screws(joint: Joint, A: Array, B: Array, length: float) -> Array:
+    """The twists (n, 6, k) at the base's origin for unit velocities of a joint's coordinates, A and B (n, 4, 4) what
+    brought its links from the zero configuration."""
+    R, found = A[:, :3, :3], elementary(joint.type, joint.axes, across)
+    slides, turns = (
+        np.array([axis for kind, axis in found if kind is each]).reshape(-1, 3)
+        for each in (JointType.PRISMATIC, JointType.REVOLUTE)
+    )
+    turned = R @ turns.T
+    if joint.type is JointType.UNIVERSAL:
+        turned[:, :, 1] = B[:, :3, :3] @ turns[1]
+    arms = hat(_centre(joint, A) / length) @ turned
+    slid = R @ slides.T
+    return np.concatenate(
+        [np.concatenate([slid, np.zeros_like(slid)], axis=1), np.concatenate([arms, turned], axis=1)], axis=2
+    )
+
+
+def _centre(joint: Joint, A: Array) -> Array:
+    return np.asarray(A[:, :3, :3] @ joint.point + A[:, :3, 3])
+
+
+def _displacements(model: PinocchioModel, frames: Mapping[str, Array]) -> dict[str, Array]:
+    """What brought each link from the zero configuration to poses (n, 4, 4)."""
+    return {name: X @ inverse(model.mechanism.links[name].pose) for name, X in frames.items()}
+
+
+def _coordinates(joint: Joint, R: Array, shift: Array) -> list[Array]:
+    """The coordinates of each of a joint's parts, (n, 1) or (n, 4), in the order of the twin's."""
+    match joint.type:
+        case JointType.UNIVERSAL:
+            first, second = joint.axes
+            normal = np.cross(first, second)
+            carried = R @ second
+            one = np.arctan2(carried @ normal, carried @ np.cross(normal, first))[:, None]
+            rest = exponential(-one * first) @ R
+            return [one, _angle(rest, second)]
+        case JointType.SPHERICAL:
+            return [quaternions(R)[:, [1, 2, 3, 0]]]
+        case _:
+            return [
+                shift @ axis[:, None] if kind is JointType.PRISMATIC else _angle(R, axis)
+                for kind, axis in elementary(joint.type, joint.axes, across)
+            ]
+
+
+def _angle(R: Array, axis: Array) -> Array:
+    """The angle (n, 1) of rotations about an axis."""
+    sine = 0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], 1) @ axis
+    return np.arctan2(sine, 0.5 * (np.trace(R, axis1=1, axis2=2) - 1))[:, None]

@@ -1,0 +1,239 @@
+"""Closed configurations at wanted poses, reached from the zero configuration by small steps in its working mode."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Container, Iterator, Sequence
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..budgets import FIRST_CELLS, SWEEP_HALVINGS
+from ..errors import NotSampled, PoseNotReached
+from ..geometry.ranks import range_basis
+from ..geometry.vectors import Array
+from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.continuation import HALVINGS, are_dependent, nearest, track
+from ..kinematics.leg_reach import beyond_rods, worst_leg
+from ..kinematics.limits import at_end, wrists_beyond
+from ..kinematics.platform_motion import PlatformMotion, PoseTask
+from ..kinematics.tasks import Task, system
+from ..kinematics.velocity_relation import ObservationModel
+from ..kinematics.walking import random_walk
+from ..mechanism.pose import Grid, Pose
+from ..progress import report
+from ..tolerances import AS_PRINTED, EASY_RANK, NEAR_FOLD
+
+if TYPE_CHECKING:
+    from .configuration_builder import ConfigurationBuilder
+
+
+def generic_motion(start: ClosedConfiguration, observation_model: ObservationModel) -> PlatformMotion:
+    """What the platform generically does, from a few random configurations."""
+    return PlatformMotion.of(random_walk(start, 4, steps=2), observation_model)
+
+
+def reach(
+    start: ClosedConfiguration, observation_model: ObservationModel, pose: Pose, motion: PlatformMotion | None = None
+) -> ClosedConfiguration:
+    """The configuration at ``pose`` that small steps lead to from ``start``; free parts are nearest to their values at
+    the zero configuration (characteristic lengths, radians).
+
+    ``motion`` is what the platform generically does (default: found by a random walk). Raises ``BadRequest`` for parts
+    that it cannot change, ``PoseNotReached`` where the way ends before the pose.
+    """
+    motion = motion or generic_motion(start, observation_model)
+    robot = start.model.mechanism.name
+    goal = motion.goal(pose, robot)
+    here, came = _lead_from(start, lambda: _origins(start, motion, goal), motion, goal)
+    found = nearest(here, goal, motion.at_home()) if came == 1 else here
+    if came < 1 or not _has_arrived(found, goal):
+        missed = worst_leg(start.model, motion, goal)
+        last = str(motion.pose(here.pose(motion.link)))
+        wrist = at_end(here)
+        why = (
+            None
+            if missed or wrist
+            else (dependence(start, motion, goal, "this pose", came == 0) or _lost_rank(start, here))
+        )
+        raise PoseNotReached(robot, str(pose), came, last, missed, wrist=wrist, why=why)
+    return found
+
+
+def dependence(
+    start: ClosedConfiguration, motion: PlatformMotion, goal: PoseTask, what: str, stuck: bool = False
+) -> str | None:
+    """That parts of wanted poses (``what``) depend on each other, at zero and elsewhere, or where the way is ``stuck``
+    at zero, there; None where they do not. A part alone depends on nothing: the platform does not change it."""
+    rows = goal.error_and_jacobian(start.model, start.q)[1]
+    if not are_dependent(start, rows):
+        return None
+    there = any(are_dependent(at, goal.error_and_jacobian(at.model, at.q)[1]) for at in _aside(start)[-1:])
+    if not (there or stuck):
+        return None
+    freedoms = "1 freedom" if motion.dof == 1 else f"{motion.dof} freedoms"
+    where = "at zero and at a random configuration" if there else "at zero, to first order,"
+    why = (
+        "none of them changes this part"
+        if len(rows) == 1
+        else f"parts of {what} depend on each other" + ": give fewer" * there
+    )
+    return f"the platform has {freedoms}, and {where} {why}"
+
+
+def grid_dependence(start: ClosedConfiguration, motion: PlatformMotion, grid: Grid) -> str | None:
+    """What :func:`dependence` says of the poses of a grid."""
+    goal = motion.goal(next(iter(grid.poses_at([(0,) * grid.ndim]))), start.model.mechanism.name)
+    return dependence(start, motion, goal, "these poses")
+
+
+def _aside(start: ClosedConfiguration) -> list[ClosedConfiguration]:
+    """Random configurations beside ``start``; none where every step from it comes near a singularity."""
+    try:
+        return list(random_walk(start, 8, steps=2))
+    except NotSampled:
+        return []
+
+
+def _origins(start: ClosedConfiguration, motion: PlatformMotion, goal: PoseTask) -> list[ClosedConfiguration]:
+    """Where ways to goals with the parts of this one may begin besides ``start``: aside, if the platform changes fewer
+    of these parts at ``start`` than there, though it has all its freedoms (a turn that two others make together)."""
+    rows = goal.error_and_jacobian(start.model, start.q)[1]
+    if not are_dependent(start, rows):
+        return []
+    if _parts_changed(start, motion.at_home().error_and_jacobian(start.model, start.q)[1]) < motion.dof:
+        return []
+    return [
+        at
+        for at in _aside(start)
+        if _parts_changed(at, goal.error_and_jacobian(at.model, at.q)[1]) > _parts_changed(start, rows)
+    ]
+
+
+def _parts_changed(at: ClosedConfiguration, rows: Array) -> int:
+    """How many of the parts with Jacobian ``rows`` (k, nv) change one by one, with closed loops."""
+    return range_basis(rows @ at.kernel()[0], 1.0)[1].value
+
+
+def _lead_from(
+    here: ClosedConfiguration,
+    beside: Callable[[], Sequence[ClosedConfiguration]],
+    motion: PlatformMotion,
+    goal: PoseTask,
+    halvings: int = HALVINGS,
+) -> tuple[ClosedConfiguration, float]:
+    """Where small steps lead to a goal, as :func:`.steps.track`: from ``here``, or else from the two ``beside`` that
+    are nearest to the goal."""
+    led = track(here, motion, goal, halvings)
+    if led[1] == 1:
+        return led
+    for at in sorted(beside(), key=lambda at: float(np.linalg.norm(goal.error_and_jacobian(at.model, at.q)[0])))[:2]:
+        if (other := track(at, motion, goal, halvings))[1] == 1:
+            return other
+    return led
+
+
+def _lost_rank(start: ClosedConfiguration, here: ClosedConfiguration) -> str | None:
+    """That the way ended where the loops lose rank, if it did."""
+    kept, left = start.strengths, here.strengths
+    if len(left) == len(kept) and (not len(kept) or left[-1] > EASY_RANK * kept[-1]):
+        return None
+    return "on the straight path to it the loops lose rank (a constraint singularity), which small steps do not pass"
+
+
+def _has_arrived(at: ClosedConfiguration, goal: PoseTask) -> bool:
+    """Whether a configuration is at the wanted pose, by its matrix, and no wrist is beyond its interval."""
+    return goal.is_met(at.pose(goal.link), AS_PRINTED * max(1.0, at.model.length)) and not wrists_beyond(at.model, at.q)
+
+
+def sweep(
+    start: ClosedConfiguration,
+    observation_model: ObservationModel,
+    grid: Grid,
+    motion: PlatformMotion | None = None,
+    placer: ConfigurationBuilder | None = None,
+) -> tuple[ClosedConfiguration | None, ...]:
+    """Configurations at the poses of a grid, in its order, each reached from a neighbour; None where that fails from
+    every neighbour. The first is the reachable one nearest to ``start``.
+
+    A ``placer`` gives them at once where the legs are known subproblems and free parts can stay as they are at zero;
+    only the others are led there step by step."""
+    motion = motion or generic_motion(start, observation_model)
+    goals = [motion.goal(pose, start.model.mechanism.name) for pose in grid.poses()]
+    home = motion.at_home()
+    from .grids import ready
+
+    at_once, hopeless = (
+        ({}, beyond_rods(start.model.mechanism, motion, goals)) if placer is None else (ready(placer, motion, goals))
+    )
+
+    beside = cache(lambda: _origins(start, motion, goals[0]))
+
+    def lead(cell: int, origin: ClosedConfiguration, halvings: int) -> ClosedConfiguration | None:
+        if cell in hopeless:
+            return None
+        if cell in at_once:
+            there, came = at_once[cell], 1.0
+        else:
+            there, came = _lead_from(origin, beside, motion, goals[cell], halvings)
+            there = nearest(there, goals[cell], home) if came == 1 else there
+        return there if came == 1 and _has_arrived(there, goals[cell]) else None
+
+    return spread(start, grid.shape, goals, lead, at_once)
+
+
+def spread(
+    start: ClosedConfiguration,
+    shape: tuple[int, ...],
+    goals: Sequence[Task],
+    lead: Callable[[int, ClosedConfiguration, int], ClosedConfiguration | None],
+    at_once: Container[int] = (),
+) -> tuple[ClosedConfiguration | None, ...]:
+    """Configurations at the ``goals`` of a grid's cells, of a ``shape``: ``lead`` gives that of a cell from a
+    configuration nearby with so many halvings, None where it does not come there. It begins at the goal nearest to
+    ``start``, and at further ones where no neighbour is reached from it, and goes on to neighbours, but not from a
+    fold: working modes meet there, and small steps go on in any. Cells ``at_once`` need no steps."""
+    model = start.model
+    found: dict[int, ClosedConfiguration] = {}
+    queue: deque[tuple[int, int]] = deque()
+    distance = [float(np.linalg.norm(goal.error_and_jacobian(model, start.q)[0])) for goal in goals]
+    rank = range_basis(system(model, start.q, goals[0])[1])[1].value
+
+    def settle(cell: int, origin: ClosedConfiguration, halvings: int) -> None:
+        there = lead(cell, origin, halvings)
+        if there is not None:
+            found[cell] = there
+            queue.extend((other, cell) for other in _neighbours(cell, shape) if other not in found)
+            report("poses")
+
+    @cache
+    def is_fold(cell: int) -> bool:
+        J = system(model, found[cell].q, goals[cell])[1]
+        return bool(np.linalg.svd(J, compute_uv=False)[rank - 1] <= NEAR_FOLD)
+
+    alone = False
+    for first in sorted(range(len(distance)), key=lambda i: (round(distance[i], 9), i))[:FIRST_CELLS]:
+        if first in found:
+            continue
+        before = len(found)
+        settle(first, start, HALVINGS)
+        while queue:
+            cell, origin = queue.popleft()
+            if cell not in found and (cell in at_once or not is_fold(origin)):
+                settle(cell, found[origin], SWEEP_HALVINGS)
+        alone |= len(found) == before + 1
+        if found and not alone:
+            break
+    return tuple(found.get(cell) for cell in range(len(goals)))
+
+
+def _neighbours(cell: int, shape: tuple[int, ...]) -> Iterator[int]:
+    """The cells next to one, along each axis."""
+    place = np.unravel_index(cell, shape)
+    for axis, size in enumerate(shape):
+        for side in (-1, 1):
+            if 0 <= place[axis] + side < size:
+                beside = [*place]
+                beside[axis] += side
+                yield int(np.ravel_multi_index(beside, shape))

@@ -1,0 +1,334 @@
+"""Words of architectures: legs as chains of joints whose axes are named, robots as multisets of legs on a platform.
+
+A word says what stays so in motion and nothing else, no lengths::
+
+    robot    = [platform ":"] legs ["|" legs] ["@" sights]
+    platform = "point" (all legs end on one R axis) or "bar" / "slide" (two plates, joined by a bar on two R and its
+               parallel twin, or by a P; "|" parts the legs of the one from those of the other)
+    legs     = [count] "(" joint ("-" joint)* ")", several joined by "+"
+    joint    = letter axes ["*"] ["!"]
+    letter   = R P C (one axis), U (two, at right angles), S (none), Pi (the normal of a parallelogram), 2SS (two equal
+               parallel rods between S joints, the axis along their distance), 2US (the same with U at the upper ends)
+
+    sights   = [count] kind ["'"], several joined by "+": what cameras on the base, or IMUs, see of the platform in the
+               place of the legs; ``'`` gives each a camera of its own, the others have one in common
+
+``*`` marks a motor, ``!`` the joint after which the observed link follows (of two rods, the first of them), where it is
+not the default segment. Axes are directions at the zero configuration, named by
+
+=======  ==============================================================================================================
+x y z    the base's axes: the same direction for all legs; z is the normal of a planar robot
+t r      the tangent and the radius of the leg's foot on the base
+k        some direction of the leg's own normal to t
+h j m    directions of the leg's own normal to z
+a b c    directions of the leg's own, in general position
+l        along the line from the centre before to the centre after
+o        through a point that all legs share
+n q      in a U: normal to its other axis, and (n) to the line of centres next to it; n of a Pi: normal to the axis of
+         the joint before it and to its rods
+=======  ==============================================================================================================
+
+The canonical word has its legs sorted, first as if they had no motors (a motor changes no leg's label), names letters
+of the same kind in the order of the leg, and drops the ``!`` of a default segment. It is the key of the catalog and is
+stable: a change of what a word means is a change of ``VERSION``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+
+from ..budgets import LARGEST_WORD
+from ..errors import BadRequest
+from ..mechanism.observations import kinds
+from ..mechanism.observations.encoder import Encoder
+
+VERSION = 1
+"""Version of the words and of the mechanisms they stand for."""
+
+AXES = {"R": 1, "P": 1, "C": 1, "U": 2, "S": 0, "Pi": 1, "2SS": 1, "2US": 1}
+"""How many axes each letter has."""
+FREEDOMS = {"R": 1, "P": 1, "C": 2, "U": 2, "S": 3, "Pi": 1, "2SS": 4, "2US": 4}
+"""Freedoms of each letter (idle ones left out)."""
+COMPOSITE = ("Pi", "2SS", "2US")
+MOVED = ("R", "P", "C", "U")
+"""Letters that can have a motor."""
+NAMES = "xyztrkhjmabclonq"
+"""Names of directions."""
+ALIKE = ("hjm", "abc")
+"""Names that stand for the same kind of direction, in the order in which a leg uses them."""
+SENSORS = "sensors"
+"""The group of words whose platform is seen; all others watch legs."""
+PLATFORMS = {"": 1, "point": 1, "bar": 2, "slide": 2}
+"""Platforms, and the bodies on which legs end."""
+
+_JOINT = re.compile(r"(?P<letter>2SS|2US|Pi|[RPCUS])(?P<axes>[a-z]*)(?P<motor>\*?)(?P<watched>!?)")
+LEGS_KEPT = 10_000
+"""Legs that were read and are kept."""
+LONGEST_COUNT = 9
+"""Digits of a number of legs that are read: more than any robot has."""
+_LEGS = re.compile(r"(?P<count>[0-9]*)\((?P<leg>[^()]*)\)")
+_SIGHTS = re.compile(r"(?P<count>[0-9]*)(?P<kind>[a-z_]+)(?P<own>'?)")
+
+
+@dataclass(frozen=True, order=True)
+class JointSymbol:
+    """A joint of a leg: its letter, the names of its axes, whether it has a motor, whether the link after it is
+    observed."""
+
+    letter: str
+    axes: str = ""
+    motor: bool = False
+    watched: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.letter}{self.axes}{'*' * self.motor}{'!' * self.watched}"
+
+
+@dataclass(frozen=True, order=True)
+class LegKey:
+    """A leg from the base to the platform."""
+
+    joints: tuple[JointSymbol, ...]
+
+    def __str__(self) -> str:
+        return self._text
+
+    @cached_property
+    def _text(self) -> str:
+        return f"({'-'.join(map(str, self.joints))})"
+
+    @property
+    def freedoms(self) -> int:
+        """Freedoms of the leg's end."""
+        return sum(FREEDOMS[joint.letter] for joint in self.joints)
+
+    @cached_property
+    def unmoved(self) -> LegKey:
+        """The leg without its motors."""
+        return LegKey(tuple(replace(joint, motor=False) for joint in self.joints))
+
+    @cached_property
+    def unmarked(self) -> LegKey:
+        """The leg of which the default segment is observed."""
+        return LegKey(tuple(replace(joint, watched=False) for joint in self.joints))
+
+    @cached_property
+    def chain(self) -> LegKey:
+        """The joints alone, in canonical names: nothing is driven, the default segment is observed."""
+        return self.unmoved.unmarked.canonical
+
+    @property
+    def driven(self) -> LegKey:
+        """The leg with one motor, on its first R or P."""
+        first = next((i for i, joint in enumerate(self.joints) if joint.letter in ("R", "P")), None)
+        return LegKey(tuple(replace(joint, motor=i == first) for i, joint in enumerate(self.joints)))
+
+    @property
+    def observed(self) -> int | None:
+        """The joint after which the observed link follows; None for the default segment."""
+        return next((i for i, joint in enumerate(self.joints) if joint.watched), None)
+
+    @cached_property
+    def canonical(self) -> LegKey:
+        """The leg with names in order and without the mark of a default segment."""
+        names: dict[str, str] = {}
+        for name in "".join(joint.axes for joint in self.joints):
+            for kind in ALIKE:
+                if name in kind and name not in names:
+                    names[name] = kind[sum(known in kind for known in names)]
+        axes = ["".join(names.get(name, name) for name in joint.axes) for joint in self.joints]
+        mark = self.observed
+        if mark is not None:
+            inside = self.joints[mark].letter in COMPOSITE and mark + 1 < len(self.joints)
+            mark = mark if inside else self._along(mark)
+            mark = None if mark == self._default() and not inside else mark
+        return LegKey(
+            tuple(
+                replace(joint, axes=own, watched=i == mark)
+                for i, (joint, own) in enumerate(zip(self.joints, axes, strict=True))
+            )
+        )
+
+    def _along(self, mark: int) -> int:
+        """The last link that turns as this one: P joints do not change a direction."""
+        while mark + 2 < len(self.joints) and self.joints[mark + 1].letter == "P":
+            mark += 1
+        return mark
+
+    def _default(self) -> int:
+        """The joint before the default segment: the axis of a P between two moving links, else the last segment."""
+        inner = range(1, len(self.joints) - 1)
+        slide = next((i for i in inner if self.joints[i].letter == "P"), None)
+        if slide is not None:
+            return self._along(slide - 1)
+        return len(self.joints) - (1 if self.joints[-1].letter in COMPOSITE else 2)
+
+    @cached_property
+    def order(self) -> tuple[tuple[object, ...], ...]:
+        """Its place among others: as it is without motors, then by its motors."""
+        return (
+            tuple((joint.letter, joint.axes, False, joint.watched) for joint in self.joints),
+            tuple((joint.letter, joint.axes, joint.motor, joint.watched) for joint in self.joints),
+        )
+
+
+@dataclass(frozen=True, order=True)
+class SightWord:
+    """An observation of the platform: its kind, and whether by a camera of its own."""
+
+    kind: str
+    own: bool = False
+
+    def __str__(self) -> str:
+        return self.kind + "'" * self.own
+
+
+@dataclass(frozen=True)
+class ArchitectureKey:
+    """An architecture: a platform and, for each of its bodies, the legs that end on it, sorted; and what is seen of the
+    platform instead of the legs, sorted too."""
+
+    platform: str
+    bodies: tuple[tuple[LegKey, ...], ...]
+    seen: tuple[SightWord, ...] = ()
+
+    @classmethod
+    def of(
+        cls, legs: list[LegKey], *more: list[LegKey], platform: str = "", seen: Iterable[SightWord] = ()
+    ) -> ArchitectureKey:
+        """The canonical word of these legs; ``more``: those of a second body."""
+        bodies = (tuple(sorted((leg.canonical for leg in body), key=lambda leg: leg.order)) for body in (legs, *more))
+        return cls(
+            platform,
+            tuple(sorted(bodies, key=lambda body: [*zip(*(leg.order for leg in body), strict=True)])),
+            tuple(sorted(seen)),
+        )
+
+    @property
+    def legs(self) -> tuple[LegKey, ...]:
+        """All legs, in the order of their labels 1, 2, …"""
+        return tuple(leg for body in self.bodies for leg in body)
+
+    @property
+    def unmoved(self) -> ArchitectureKey:
+        """The architecture without its motors: what the hidden robot is found from."""
+        return ArchitectureKey.of(
+            *[[leg.unmoved for leg in body] for body in self.bodies], platform=self.platform, seen=self.seen
+        )
+
+    @property
+    def driven(self) -> ArchitectureKey:
+        """The architecture with a motor on the first R or P of each leg: three R that meet in a point are no S then."""
+        return ArchitectureKey.of(
+            *[[leg.driven for leg in body] for body in self.bodies], platform=self.platform, seen=self.seen
+        )
+
+    @property
+    def unmarked(self) -> ArchitectureKey:
+        """The architecture of which the default segment of each leg is observed, and nothing else."""
+        return ArchitectureKey.of(*[[leg.unmarked for leg in body] for body in self.bodies], platform=self.platform)
+
+    @property
+    def unseen(self) -> ArchitectureKey:
+        """The architecture without its sensors."""
+        return replace(self, seen=())
+
+    def __str__(self) -> str:
+        bodies = [count_equal(body) for body in self.bodies]
+        seen = f"@{count_equal(self.seen)}" if self.seen else ""
+        return (f"{self.platform}:{'|'.join(bodies)}" if self.platform else bodies[0]) + seen
+
+
+def count_equal(symbols: Iterable[LegKey | SightWord]) -> str:
+    """Equal ones once with their number, joined by +."""
+    return "+".join(f"{count if count > 1 else ''}{each}" for each, count in Counter(map(str, symbols)).items())
+
+
+def parse(text: str) -> ArchitectureKey:
+    """The word that ``text`` writes, canonical; raises ``BadRequest`` with what is wrong in it."""
+    robot, at, seen = text.strip().partition("@")
+    platform, colon, rest = robot.rpartition(":")
+    if platform not in PLATFORMS or bool(colon) != bool(platform):
+        raise BadRequest(f"word {text!r}: unknown platform", platform, [name for name in PLATFORMS if name])
+    bodies = [_legs(text, part) for part in rest.split("|")]
+    if len(bodies) != PLATFORMS[platform]:
+        raise BadRequest(f"word {text!r}: bodies on which legs end", len(bodies), str(PLATFORMS[platform]))
+    word = ArchitectureKey.of(*bodies, platform=platform, seen=sights(seen) if at else ())
+    if at and any(leg.observed is not None for leg in word.legs):
+        raise BadRequest(f"word {text!r}: links of legs are not watched", "!", "no ! where something else is seen")
+    if not 2 <= len(word.legs) <= LARGEST_WORD:
+        raise BadRequest(f"word {text!r}: number of legs", len(word.legs), f"2 to {LARGEST_WORD}")
+    return word
+
+
+def sights(text: str) -> tuple[SightWord, ...]:
+    """What is seen of the platform, canonical; raises ``BadRequest``."""
+    known, found = [name for name, kind in kinds().items() if not issubclass(kind, Encoder)], list[SightWord]()
+    for term in text.split("+"):
+        match = _SIGHTS.fullmatch(term.strip())
+        count = int(match["count"][:LONGEST_COUNT] or 1) if match else 0
+        if match is None or match["kind"] not in known or not 1 <= count <= LARGEST_WORD:
+            raise BadRequest(
+                f"what is seen, {text!r}: cannot be read",
+                term,
+                f"kinds such as 3point, joined by +: {', '.join(known)}; up to {LARGEST_WORD}",
+            )
+        found += [SightWord(match["kind"], bool(match["own"]))] * count
+    return tuple(sorted(found))
+
+
+def _legs(text: str, part: str) -> list[LegKey]:
+    found: list[LegKey] = []
+    for term in part.split("+"):
+        match = _LEGS.fullmatch(term.strip())
+        if match is None:
+            raise BadRequest(f"word {text!r}: cannot be read", term, "legs such as 3(Rz*-Rz-Rz), joined by +")
+        count = int(match["count"][:LONGEST_COUNT] or 1)
+        if not 1 <= count <= LARGEST_WORD:
+            raise BadRequest(f"word {text!r}: number of equal legs", count, f"1 to {LARGEST_WORD}")
+        try:
+            leg = _known_leg(match["leg"])
+        except BadRequest:
+            leg = _leg(text, match["leg"])  # in words that name all of it
+        found += [leg] * count
+    return found
+
+
+@lru_cache(LEGS_KEPT)
+def _known_leg(chain: str) -> LegKey:
+    """Words have few different legs: what follows from one is found once."""
+    return _leg(chain, chain)
+
+
+def _leg(text: str, chain: str) -> LegKey:
+    joints = tuple(_joint(text, part) for part in chain.split("-"))
+    if joints[0].letter == "Pi" and joints[0].axes == "n":
+        raise BadRequest(f"word {text!r}: the Pi's normal is normal to the axis before it", chain, "a joint before it")
+    if sum(joint.watched for joint in joints) > 1:
+        raise BadRequest(f"word {text!r}: observed links of one leg", sum(joint.watched for joint in joints), "one")
+    if joints[-1].watched and joints[-1].letter not in COMPOSITE:
+        raise BadRequest(f"word {text!r}: observed", "the platform", "a link of the leg")
+    if len(joints) == 1 and joints[0].letter not in COMPOSITE:
+        raise BadRequest(f"word {text!r}: a leg of one joint has no segment to observe", chain, "two joints or more")
+    return LegKey(joints)
+
+
+def _joint(text: str, part: str) -> JointSymbol:
+    match = _JOINT.fullmatch(part)
+    if match is None:
+        raise BadRequest(f"word {text!r}: unknown joint", part, f"a letter of {', '.join(AXES)}, axes, * and !")
+    letter, axes = match["letter"], match["axes"]
+    if len(axes) != AXES[letter]:
+        raise BadRequest(f"word {text!r}: axes of {part!r}", len(axes), f"{AXES[letter]} for {letter}")
+    unknown = sorted(set(axes) - set(NAMES))
+    if unknown:
+        raise BadRequest(f"word {text!r}: unknown axis in {part!r}", unknown[0], " ".join(NAMES))
+    if letter != "U" and set(axes) & {"n", "q"} and (letter, axes) != ("Pi", "n"):
+        raise BadRequest(f"word {text!r}: axis n or q of {part!r}", letter, "a U, whose other axis it is normal to")
+    if match["motor"] and letter not in MOVED:
+        raise BadRequest(f"word {text!r}: a motor on {part!r}", letter, MOVED)
+    return JointSymbol(letter, axes, bool(match["motor"]), bool(match["watched"]))

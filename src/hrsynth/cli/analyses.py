@@ -1,0 +1,151 @@
+"""The commands that ask one question about a robot: their options, and the outputs of their answers."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from ..index import analyses, options
+from ..options import OUTPUT, Option, output
+from ..present.outputs import File, outputs_of
+from ..progress import on_progress
+from .colour import paint, say
+from .commands import Group, add_command
+from .options import JSON, SOURCE, robot_of, split_names, told_radians, told_turns, warn
+from .progress import Progress
+from .studio import PORT, serve
+
+
+@dataclass(frozen=True)
+class Question:
+    """A command that asks an analysis of this ``name``: its options as declared, those of its files, and ``more``.
+    ``shows`` is called with the answer instead of printing the text where nothing was written, and ``needs`` says
+    before the work what it lacks."""
+
+    name: str
+    more: tuple[Option, ...] = ()
+    shows: Callable[..., None] | None = None
+    needs: Callable[[], object] | None = None
+
+    def add(self, app: Group) -> None:
+        """Make it a command."""
+        declared = analyses()[self.name]
+        files = outputs_of(self.name).files
+        given = options(self.name)
+        own = [each for each in given if each.name != "seed"]
+        own += [each for file in files for each in file.asks]
+        own += [_file_option(each) for each in files if each.option is not None]
+        drawn = FIGURE if any(each.drawn for each in files) else ()
+        seed = [each for each in given if each.name == "seed" and declared["seeded"]]
+        every = [SOURCE[0], *own, *self.more, *seed, *drawn, JSON, *SOURCE[1:]]
+        add_command(app, self.name, declared["help"], every, self.answer, declared["examples"])
+
+    def answer(self, *, json: bool, **values: Any) -> None:
+        """Ask, write the files that are asked for, print."""
+        import hrsynth
+
+        from ..description.files import require_other
+        from ..present.show import record, text
+
+        files = {each: values.pop(each.option) for each in outputs_of(self.name).files if each.option is not None}
+        for each, path in files.items():
+            each.require(path, values)
+        if self.needs is not None and not json and not any(files.values()):
+            self.needs()
+        source = {each.name: values[each.name] for each in SOURCE}
+        more = {each.record: None for each in files if each.record is not None}
+        writers = []
+        with Progress() as progress, on_progress(progress.tell):
+            mechanism = robot_of(values)
+            function = getattr(hrsynth, self.name)
+            given = self._given_options(function, values)
+            for each, path in files.items():
+                given |= each.question_fields(path)
+                if path is not None:
+                    require_other(path, source["robot"], mechanism.file)
+                each.require_drawable(path, mechanism, values | given)
+            for option in ("at", "start", "goal"):
+                told_turns(option, values.get(option))
+            found = function(mechanism, **given)
+            for option in ("cone", "noise"):
+                told_radians(option, values.get(option))
+            for each, path in files.items():
+                if path is None:
+                    continue
+                why = each.unwritten(found, path)
+                if why is not None:
+                    warn(why)
+                    files[each] = None
+                    continue
+                writer, told = each.writer(found, path, values)
+                writers.append(writer)
+                more |= told
+        for write in writers:
+            write()
+        written = {each.field: path for each, path in files.items() if each.field is not None}
+        if json:
+            say(record(self.name, mechanism, {**found.to_dict(), **more, **written}))
+        elif self.shows is not None and not any(written.values()):
+            self.shows(found, source=source, **values)
+        else:
+            say(text(found), paint=paint)
+            for each, path in files.items():
+                if path is not None:
+                    say(each.sentence(path))
+        motors = mechanism.proposed_motors if self.name in ("derive", "check") else None
+        if motors is not None and motors not in getattr(found, "more", ()):
+            warn(motors)
+        for declared in options(self.name):
+            if declared.deprecated and values.get(declared.name) is not None:
+                warn(f"{declared.names[0]} is deprecated, {declared.deprecated}")
+        found.require_answered(**values)
+
+    def _given_options(self, function: Callable[..., Any], values: dict[str, Any]) -> dict[str, Any]:
+        """The options that a function takes and that are given."""
+        known = inspect.signature(function).parameters
+        given = {name: value for name, value in values.items() if name in known and value is not None}
+        if "observe" in given:
+            given["observe"] = split_names(given["observe"])
+        if len(given.get("camera", ())) == 1:
+            (given["camera"],) = given["camera"]
+        return given
+
+
+def _servable() -> None:
+    """Raise ``MissingExtra`` where a library that serves pages is missing."""
+    from ..present.studio.server import require_libraries
+
+    require_libraries()
+
+
+def _serve_view(found: Any, source: dict[str, Any], port: int, open_: bool, **_: Any) -> None:
+    """Serve a view until Ctrl-C, and open its page in the browser."""
+    from ..present.show import text
+    from ..present.studio.server import view_server
+
+    serve(view_server(found, port, open_, source), f"{text(found)}\nThe view")
+
+
+def _file_option(file: File) -> Option:
+    """The option of a file that an answer can be written to."""
+    if file.option == "output":
+        return output(file.help)
+    return Option(str(file.option), file.help, "FILE", group=OUTPUT)
+
+
+FIGURE = (
+    Option(
+        "width", "Width of a figure, such as 88mm or 3.5in, laid out for that with text of 8pt.", "LENGTH", group=OUTPUT
+    ),
+    Option("font", "Font of a figure, its size, or both: serif, 8pt, 'DejaVu Sans 8pt'.", group=OUTPUT),
+)
+VIEW = Question(
+    "view",
+    (PORT, Option("open_", "Open the page in the browser.", None, bool, True, ("--open/--no-open",))),
+    _serve_view,
+    _servable,
+)
+QUESTIONS = tuple(VIEW if name == VIEW.name else Question(name) for name in analyses())
+"""The commands in the order of the help."""

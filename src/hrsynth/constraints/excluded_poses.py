@@ -1,0 +1,97 @@
+"""What a named condition leaves out: poses at which the platform may move as it does nowhere else.
+
+At a constraint singularity the loops lose rank, and a platform that translates, or moves in a plane, may turn or leave
+that plane there, and go on in another operation mode. It then turns with rates that every leg's joints can give its
+end, and these are within one space for each leg, the span of what they can give over all samples. Where no direction is
+in the spaces of all legs of a body, where one leg alone keeps it in its plane, and where a leg with its measurements
+held leaves it no such motion, there is no such pose. A platform in space is held by what the condition names and by
+nothing else, at all poses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..geometry.ranks import range_basis
+from ..geometry.vectors import Array, cross
+from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.locked_twists import leg_twists_together
+from ..mechanism.legs import LegDecomposition
+from ..tolerances import SAME_RELATION
+from .condition import Condition, Named
+from .locked_legs import LockedLeg
+from .named_vectors import poses_at, vanishes
+from .pattern import ConstraintPattern
+
+
+def unexamined_poses(
+    decomposition: LegDecomposition,
+    pattern: ConstraintPattern,
+    condition: Condition | None,
+    samples: Sequence[ClosedConfiguration],
+) -> tuple[str, ...]:
+    """Poses to which a condition does not apply, in words; none of one that the screws of all joints give."""
+    if not isinstance(condition, Named):
+        return ()
+    found = []
+    folding = [leg.label for leg in decomposition.legs if leg.has_loops]
+    if folding:
+        found.append(
+            f"poses at which a loop inside a leg ({', '.join(folding)}) lies flat, and those behind them, at "
+            "which it closes another way (crossed rods), are not examined"
+        )
+    more: tuple[str, ...] = ()
+    if pattern.motion in ("translations", "bodies") and may_turn(decomposition, pattern.legs, samples):
+        more = ("turn", "turned")
+    elif pattern.motion == "planar" and _may_leave_the_plane(decomposition, pattern, samples):
+        more = ("leave its plane", "left it")
+    if more:
+        found.append(
+            f"poses at which the loops lose rank, so that the platform may {more[0]} (constraint "
+            f"singularities), and those at which it has {more[1]} are not examined"
+        )
+    return tuple(found)
+
+
+def may_turn(
+    decomposition: LegDecomposition, held: Sequence[LockedLeg], samples: Sequence[ClosedConfiguration]
+) -> bool:
+    """Whether a body of the platform may turn at some pose with these legs held, as far as the turns of all legs'
+    joints tell."""
+    if decomposition.point is not None:
+        return False
+    for body in dict.fromkeys(leg.platform_link for leg in decomposition.legs):
+        if any(leg.body == body and leg.turns == 0 and not leg.spins for leg in held):
+            continue
+        forbidden = []
+        for twists in _twists(decomposition, body, samples):
+            turns, _ = range_basis(twists[3:], 1.0)
+            forbidden.append(np.eye(3) - turns @ turns.T)
+        if np.linalg.svd(np.vstack(forbidden), compute_uv=False)[2] < SAME_RELATION:
+            return True
+    return False
+
+
+def _may_leave_the_plane(
+    decomposition: LegDecomposition, pattern: ConstraintPattern, samples: Sequence[ClosedConfiguration]
+) -> bool:
+    """Whether none of the legs, held or not, keeps the platform in its plane."""
+    assert pattern.plane is not None
+    if pattern.flat and any(leg.turns == 1 and not leg.virtual for leg in pattern.legs):
+        return False
+    normal = pattern.plane.value(poses_at(samples[:1], pattern.plane.links))[0]
+    return not any(
+        vanishes(normal @ twists[:3]) and vanishes(cross(twists[3:].T, normal))
+        for twists in _twists(decomposition, pattern.bodies[0], samples)
+    )
+
+
+def _twists(decomposition: LegDecomposition, body: str, samples: Sequence[ClosedConfiguration]) -> list[Array]:
+    """Of each leg that ends on a body: what its joints can give its end, over all samples, (6, k)."""
+    return [
+        np.hstack(leg_twists_together(samples, leg, (), decomposition.mechanism.base))
+        for leg in decomposition.legs
+        if leg.platform_link == body
+    ]

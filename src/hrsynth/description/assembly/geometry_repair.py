@@ -1,0 +1,249 @@
+"""The nearest mechanism of the simplest structure: relations that hold to the digits of a file are made exact.
+
+Printed digits and CAD leave axes parallel to 1e-6, balls of three axes that miss each other, rods equal to 1e-7 m. Such
+noise opens loops, changes ranks (a loop with redundant constraints becomes rigid) and hides what a link is. Of all
+mechanisms with the relations that hold within a tolerance, the nearest one takes the place of the file's:
+min ‖x − x₀‖ subject to f(x) = 0, by Gauss-Newton on the constraints with a pull back along their tangent space.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from ...budgets import FINER_TRIES, LARGEST_RELATED
+from ...errors import BadMechanism, RankBelowRounding, RankUndecided, StructureUndecided
+from ...geometry.gauss_newton import Damping, Residual, descend
+from ...geometry.ranks import singular_decomposition
+from ...geometry.vectors import Array, unit
+from ...mechanism.model import JointType, Mechanism, Note
+from ...mechanism.normal import normal_form
+from ...mechanism.observations.direction import SeenAxis
+from ...tolerances import EXACT, NO_FINER, OBLIQUE, RANK_CUTOFF, RANK_GAP, SAME_GEOMETRY
+from ..jointgraph import comma_list
+from ..tree import spanning
+from .loops import LoopAssembly
+from .relations import Bodies, GeometricRelation, JointCoordinates, certain, of_axes, of_centres
+
+CONTRADICTION = "relations that contradict each other"
+DAMPING = Damping(start=1.0, eased=1.0, least=1.0, most=1e2)
+
+
+@dataclass(frozen=True, eq=False)
+class RepairedGeometry:
+    """A mechanism with exact ``relations``: those that held only nearly, and the largest shift of a centre (m) and turn
+    of an axis (rad); its normal form before the last of them, and its coordinates."""
+
+    mechanism: Mechanism
+    normal: Mechanism | None = None
+    x: Array | None = None
+    relations: frozenset[tuple[str, tuple[str, ...]]] = frozenset()
+    mended: tuple[GeometricRelation, ...] = ()
+    shift: float = 0.0
+    turn: float = 0.0
+
+    @property
+    def worst(self) -> float:
+        """The largest defect that was mended."""
+        return max((relation.defect for relation in self.mended), default=0.0)
+
+    def notes(self, tolerance: float, length: float, gap: float) -> list[Note]:
+        """What was made exact, relation by relation; ``gap`` is that of the loops' singular values as written."""
+        change = max(self.shift / length, self.turn)
+        found = [
+            Note(
+                "merged",
+                f"{len(self.mended)} relations of joints that hold to {tolerance:.1g} (characteristic "
+                f"lengths, radians; the worst to {self.worst:.1e}) are made exact, largest change "
+                f"{change:.1e}; centres moved by up to {1e3 * self.shift:.2g} mm, axes turned by up to "
+                f"{np.rad2deg(self.turn):.2g} deg; the loops' singular values as written leave a gap "
+                f"of {gap:.1e} (--tolerance to change it, --as-written to keep the numbers)",
+            )
+        ]
+        kinds: dict[str, dict[tuple[str, ...], None]] = defaultdict(dict)
+        for relation in self.mended:
+            kinds[relation.kind][relation.of] = None
+        found += [
+            Note("merged", f"made to be {kind}: " + "; ".join(comma_list(names, 40) for names in groups))
+            for kind, groups in kinds.items()
+        ]
+        return found
+
+
+def snap_geometry(mechanism: Mechanism, residual: float, tolerance: float, possible: float = 0.0) -> Mechanism:
+    """The mechanism, its loops open by ``residual``, with exact relations in place of those that hold to ``tolerance``;
+    ``possible`` is one that the numbers allow, but do not show.
+
+    Raises
+    ------
+    StructureUndecided
+        Where a slightly different tolerance would make another robot of it.
+    RankUndecided
+        Where the loops leave no gap between free and held all the same.
+    RankBelowRounding
+        Where they hold a direction by what was open alone.
+    """
+    try:
+        normal_form(mechanism)
+    except BadMechanism:  # a platform that cannot move: said where its motion is asked for
+        return mechanism
+    fine = tolerance
+    for _ in range(FINER_TRIES):
+        ideal = nearest(mechanism, fine)
+        if ideal is not None:
+            break
+        fine /= 2.0
+    else:
+        raise StructureUndecided(str(mechanism.file), tolerance, _structure(mechanism), CONTRADICTION)
+    if fine < tolerance and ideal.worst > fine / NO_FINER:
+        raise StructureUndecided(str(mechanism.file), fine, _structure(ideal.mechanism), CONTRADICTION)
+    coarse = nearest(mechanism, max(NO_FINER * tolerance, possible), ideal) if fine == tolerance else None
+    if coarse is not None and coarse is not ideal:
+        one, two = _structure(ideal.mechanism), _structure(coarse.mechanism)
+        if one != two:
+            raise StructureUndecided(str(mechanism.file), tolerance, one, two)
+    meant = LoopAssembly.of(ideal.mechanism)
+    rank, firm = meant.rank(meant.zero()), meant.rank(meant.zero(), max(RANK_CUTOFF, NO_FINER * residual))
+    if rank.gap < RANK_GAP:
+        raise RankUndecided(f"{mechanism.file}: loops with rounded numbers", rank.gap, RANK_GAP)
+    if firm.value != rank.value:
+        raise RankBelowRounding(str(mechanism.file), rank.value - firm.value, residual)
+    if ideal.mended:
+        written = LoopAssembly.of(mechanism)
+        gap = written.rank(written.zero(), max(RANK_CUTOFF, NO_FINER * tolerance)).gap
+        found, notes = spanning(ideal.mechanism), ideal.notes(tolerance, mechanism.length, gap)
+    else:
+        found, notes = (
+            mechanism,
+            []
+            if residual <= SAME_GEOMETRY
+            else [
+                Note(
+                    "merged",
+                    f"the loops are open by up to {residual:.2g} (characteristic lengths, radians; a gap of "
+                    f"{1e3 * residual * mechanism.length:.2g} mm) at zero, within the tolerance of {tolerance:.1g}: "
+                    "the joints that close them are put in the middle",
+                )
+            ],
+        )
+    return _idealise_directions(replace(found, notes=(*mechanism.notes, *notes)) if notes else found, tolerance)
+
+
+def _idealise_directions(mechanism: Mechanism, tolerance: float) -> Mechanism:
+    """With the watched directions along segments and axes of their links, or square to axes, that are nearly so."""
+    found, told = list(mechanism.observations), []
+    if not found or tolerance <= EXACT:
+        return mechanism
+    bodies = Bodies(normal_form(mechanism).mechanism)
+    for number, seen in enumerate(found):
+        if isinstance(seen, SeenAxis) and seen.link in bodies.of:
+            R = mechanism.links[seen.link].pose[:3, :3]
+            meant = R.T @ _direction(bodies, seen.link, R @ seen.direction, mechanism.length, tolerance)
+            if np.linalg.norm(meant - seen.direction) > EXACT:
+                found[number] = replace(seen, direction=meant)
+                told.append(f"of leg {seen.leg}")
+    note = Note("merged", f"made to be along segments or axes: watched directions {', '.join(told)}")
+    return replace(mechanism, observations=tuple(found), notes=(*mechanism.notes, note)) if told else mechanism
+
+
+def _direction(bodies: Bodies, link: str, d: Array, length: float, tolerance: float) -> Array:
+    """The segment of joint centres or the axis of a link that is nearest to a direction, within the tolerance, its
+    sense kept; else the direction square to the axes that it nearly is square to."""
+    joints = bodies.on[bodies.of[link]]
+    axes = [axis for joint in joints for axis in joint.axes]
+    centres = [joint.point for joint in joints if joint.type is not JointType.PRISMATIC]
+    lines = [(axis, tolerance) for axis in axes]
+    for one, two in combinations(centres, 2):
+        size = float(np.linalg.norm(two - one)) / length
+        if size > tolerance / OBLIQUE:
+            lines.append((unit(two - one), tolerance * max(1.0, 1.0 / size)))
+    misses = [float(np.linalg.norm(np.cross(d, line))) / within for line, within in lines]
+    if min(misses, default=np.inf) <= 1.0:
+        line, _ = lines[int(np.argmin(misses))]
+        return np.asarray(np.copysign(1.0, d @ line) * line)
+    square = [axis for axis in axes if abs(float(d @ axis)) <= tolerance]
+    _, s, Vt = singular_decomposition(np.array(square).reshape(-1, 3))
+    across = Vt[s > OBLIQUE]
+    return unit(d - across.T @ (across @ d))
+
+
+def nearest(mechanism: Mechanism, tolerance: float, known: RepairedGeometry | None = None) -> RepairedGeometry | None:
+    """The nearest mechanism that has every relation that holds to ``tolerance``; None where they contradict each other;
+    ``known`` where it has the same ones."""
+    if not 1 < len(mechanism.joints) <= LARGEST_RELATED or tolerance <= EXACT:
+        return RepairedGeometry(mechanism)
+    bodies = Bodies(mechanism)
+    at = JointCoordinates(mechanism, bodies, tolerance)
+    always = list(certain(at))
+    held = [*always, *(each for each in of_axes(at, bodies) if each.defect <= tolerance)]
+    if known is not None and known.x is not None and known.normal is not None and _names(held) <= known.relations:
+        x, normal = known.x, known.normal
+    else:
+        x, miss = _project(at, held)
+        if miss > EXACT:
+            return None
+        normal = normal_form(at.mechanism_of(x)).mechanism
+    held += [each for each in of_centres(at, normal, x) if each.defect <= tolerance]
+    if known is not None and _names(held) == known.relations:
+        return known
+    x, miss = _project(at, held)
+    if miss > EXACT:
+        return None
+    mended = tuple(each for each in held if each.defect > EXACT)
+    found = at.mechanism_of(x)
+    pairs = [(mechanism.joints[name], joint) for name, joint in found.joints.items()]
+    return RepairedGeometry(
+        found if mended else mechanism,
+        normal,
+        x,
+        frozenset(_names(held)),
+        mended,
+        max(float(np.linalg.norm(a.point - b.point)) for a, b in pairs),
+        max(
+            (float(np.linalg.norm(a - b)) for old, new in pairs for a, b in zip(old.axes, new.axes, strict=True)),
+            default=0.0,
+        ),
+    )
+
+
+def _names(relations: Sequence[GeometricRelation]) -> set[tuple[str, tuple[str, ...]]]:
+    return {(each.kind, each.of) for each in relations}
+
+
+def _project(at: JointCoordinates, relations: Sequence[GeometricRelation]) -> tuple[Array, float]:
+    """The nearest coordinates at which all relations hold, and the largest miss that is left; of balls alone there may
+    be no relation."""
+    start, weights = at.start, at.scale
+    if not relations:
+        return start, 0.0
+
+    def evaluate(x: Array) -> tuple[Array, Array]:
+        return (
+            np.concatenate([each.value(x) for each in relations]),
+            np.vstack([each.gradient(x) for each in relations]),
+        )
+
+    def advance(x: Array, here: Residual, factor: float) -> Array:
+        # rows that depend on each other at the solution differ by the miss before it: they are not followed
+        U, s, Vt = singular_decomposition(here.J / weights)
+        kept = s > max(30 * float(np.max(np.abs(here.error))), 1e-9) * s[0]
+        V = Vt[kept].T
+        back = weights * (start - x)
+        step = back - V @ (V.T @ back) - V @ ((U.T @ here.error)[kept] / s[kept])
+        return np.asarray(x + step / weights / factor)
+
+    x, left = descend(start, evaluate, advance, DAMPING, 15, lambda here: bool(np.max(np.abs(here.error)) <= 1e-15))
+    return x, float(np.max(np.abs(left.error), initial=0.0))
+
+
+def _structure(mechanism: Mechanism) -> str:
+    """What tells two structures apart: the joints of the normal form, and the freedoms of all joints together."""
+    assembly = LoopAssembly.of(mechanism)
+    free = sum(joint.kind.freedoms for joint, _, _ in assembly.tree) - assembly.rank(assembly.zero()).value
+    types = sorted(str(joint.type) for joint in normal_form(mechanism).mechanism.joints.values())
+    counts = ", ".join(f"{types.count(each)} {each}" for each in dict.fromkeys(types))
+    return f"joints {counts}; {free} freedoms"

@@ -1,0 +1,239 @@
+"""Branches and operation modes of a configuration space: whether a step stays on its branch, and what tells one mode
+from another.
+
+Components of the configuration space meet where the loops lose rank, and the smallest singular values fall there in
+proportion to the distance. So a step counts as following where, along it and along its correction, mobility, tangent
+space and all singular values of the loops agree: then it is short beside the distance to the next such place. This is
+measured at four points, not proved between them. Source: docs/pages/theory.md, section 5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import combinations
+
+import numpy as np
+
+from ..geometry.ranks import largest_angle, singular_values
+from ..geometry.vectors import Array
+from ..tolerances import BOUNDED, NUDGE, RANK_CUTOFF, SURELY_SOMETHING, SURELY_ZERO
+from .configuration import ClosedConfiguration
+from .velocity_relation import VelocityRelation
+
+TURNED = 0.3
+"""Largest principal angle (radians) between the tangent spaces at both ends of a step."""
+CHANGED = 1.5
+"""Largest ratio between the loops' singular values, in order, at the start of a step and along it."""
+CORRECTED = 0.2
+"""Longest correction, as part of the step: what ``TURNED`` lets a smooth branch bend away, with a margin."""
+EVENLY = 0.2
+"""Part of the weakest singular value by which its fall to a singularity may depart from an even one."""
+LARGEST_WHOLE = 4
+"""Number of observations up to which all sets of them are compared; beyond, single ones, pairs and all."""
+
+
+def follows(here: ClosedConfiguration, step: Array, there: ClosedConfiguration) -> bool:
+    """Whether ``there``, which the tangent ``step`` (nv,) from ``here`` was corrected to, lies beside ``here`` on its
+    branch: same mobility, tangent spaces close, no sheet beside it, singular values alike half way, at the step's end
+    and there."""
+    kept = here.strengths
+    if len(there.strengths) != len(kept):
+        return False
+    if not len(kept):
+        return True
+    return (
+        _alike(kept, there.strengths)
+        and _same_side(here, there)
+        and turned_little(here.kernel()[0], there.kernel()[0])
+        and alike_along(here, step)
+    )
+
+
+def alike_along(here: ClosedConfiguration, step: Array) -> bool:
+    """Whether the loops' singular values half way along a step and at its end are like those ``here``."""
+    return not len(here.strengths) or all(alike_after(here, part * step) for part in (0.5, 1.0))
+
+
+def turned_little(A: Array, B: Array) -> bool:
+    """Whether the largest principal angle is at most ``TURNED``: its sine is at most the Frobenius norm of what lies
+    outside."""
+    if A.shape == B.shape and np.linalg.norm(B - A @ (A.T @ B)) < (1 - BOUNDED) * np.sin(TURNED):
+        return True
+    return largest_angle(A, B) <= TURNED
+
+
+def alike_after(here: ClosedConfiguration, step: Array) -> bool:
+    """Whether the loops' singular values after a step are like those ``here``.
+
+    With J = U S Vᵀ here, J' there, A = S⁻¹ Uᵀ J' and δ = ‖A Aᵀ − 1‖: σ'² of Uᵀ J' lies in (1 ± δ) σ², and that of J'
+    exceeds it by no more than ‖J' − U Uᵀ J'‖². Only where these bounds do not decide are they taken apart.
+    """
+    kept, U = here.strengths, here.loops.left
+    J = here.model.jacobian(here.model.integrate(here.q, step))
+    within = U.T @ J
+    A = within / kept[:, None]
+    product = A @ A.T
+    product.reshape(-1)[:: len(kept) + 1] -= 1.0
+    change = float(np.linalg.norm(product))
+    beyond = float(np.linalg.norm(J - U @ within)) / kept[-1]
+    if change < (1 - BOUNDED) * (1 - CHANGED**-2) and change + beyond**2 < (1 - BOUNDED) * (CHANGED**2 - 1):
+        return True
+    return _alike(kept, np.asarray(np.linalg.svd(J, compute_uv=False)[: len(kept)]))
+
+
+def nears(here: ClosedConfiguration, step: Array, there: ClosedConfiguration) -> bool:
+    """As :func:`follows` for the end of a way, which may be a singularity or near one: the weakest singular value may
+    fall to zero, evenly and without a change of its sign, while all others stay alike."""
+    kept, ahead = here.strengths, there.strengths
+    others = len(kept) - 1
+    if not others <= len(ahead) <= len(kept):
+        return False
+    T, tangent = here.kernel()[0], there.kernel()[0]
+    if np.linalg.norm(T - tangent @ (tangent.T @ T), 2) > np.sin(TURNED):
+        return False
+    w, n = here.loops.left[:, others], here.loops.right[:, others]
+    middle, end = (
+        float(w @ here.model.jacobian(here.model.integrate(here.q, part * step)) @ n) / kept[others]
+        for part in (0.5, 1.0)
+    )
+    if not (-NUDGE <= end < 1 and abs(middle - (1 + end) / 2) < EVENLY):
+        return False
+    if len(ahead) == len(kept) and not _alike(ahead, _values(here, step, len(kept))):
+        return False
+    return _alike(kept[:others], ahead[:others]) and _alike(kept[:others], _values(here, step, others))
+
+
+def _same_side(here: ClosedConfiguration, there: ClosedConfiguration) -> bool:
+    """Whether the determinant of the loops, in the bases of their range and corange at ``here``, keeps its sign: two
+    sheets of the configuration space beside each other have opposite ones (for y (y − d) = 0, ∓d)."""
+    across = here.loops.left.T @ there.model.jacobian(there.q) @ here.loops.right
+    return bool(np.linalg.slogdet(across)[0] > 0)
+
+
+def _values(here: ClosedConfiguration, step: Array, count: int) -> Array:
+    """The largest singular values of the loops after a step."""
+    return np.asarray(np.linalg.svd(here.model.jacobian(here.model.integrate(here.q, step)), compute_uv=False)[:count])
+
+
+def _alike(one: Array, other: Array) -> bool:
+    return not np.any((other > CHANGED * one) | (one > CHANGED * other))
+
+
+def turns_of(found: VelocityRelation) -> tuple[int, int, int]:
+    """The rank of the angular velocities of the platform (of a formation: of all bodies), and the least and the most
+    that may be said to be: singular values above the cutoff, those that surely count, and all but those that surely do
+    not."""
+    freedoms = found.dof.value
+    values = (
+        np.zeros(0)
+        if found.twist_rows == 3 or not freedoms
+        else singular_values(found.twists.reshape(-1, 6, freedoms)[:, 3:].reshape(1, -1, freedoms))
+    )
+    rank, least, most = (int(np.sum(values > zero)) for zero in (RANK_CUTOFF, SURELY_SOMETHING, SURELY_ZERO))
+    return rank, least, most
+
+
+@dataclass(frozen=True)
+class Signature:
+    """What is the same at all generic configurations of one operation mode.
+
+    ``turns`` is the rank of the platform's angular velocities, ``turning`` the least and the most, as of
+    :func:`turns_of`. ``seen`` holds, for each of :func:`sets_of` the observations, the least and the most freedoms that
+    they may be said to see, between singular values that surely count and those that surely do not.
+    """
+
+    mobility: int
+    dimension: int
+    dof: int
+    turns: int
+    turning: tuple[int, int]
+    seen: tuple[tuple[int, int], ...]
+
+    @classmethod
+    def of(cls, found: VelocityRelation) -> Signature:
+        """The signature that ρ shows at one configuration."""
+        turns, *turning = turns_of(found)
+        chosen = _choose_rows(found.sizes)
+        rates = found.rates * chosen[:, :, None]
+        twists = np.broadcast_to(found.twist_part, (len(chosen), *found.twist_part.shape))
+        lost = [singular_values(each) for each in (np.concatenate([twists, rates], axis=1), rates)]
+        # a set S sees dof − (rank [X; Y_S] − rank Y_S) of the platform's freedoms
+        together, alone = (
+            [np.sum(values > zero, axis=1) for zero in (SURELY_SOMETHING, SURELY_ZERO)] for values in lost
+        )
+        dof = found.dof.value
+        least, most = dof - (together[1] - alone[0]), dof - (together[0] - alone[1])
+        return cls(
+            found.mobility,
+            found.dimension,
+            dof,
+            turns,
+            (turning[0], turning[1]),
+            tuple(zip(least.tolist(), most.tolist(), strict=True)),
+        )
+
+    def agrees(self, other: Signature) -> bool:
+        """Whether both can be of one operation mode."""
+        same = (self.mobility, self.dimension, self.dof) == (other.mobility, other.dimension, other.dof)
+        return same and all(
+            a[0] <= b[1] and b[0] <= a[1]
+            for a, b in zip((self.turning, *self.seen), (other.turning, *other.seen), strict=True)
+        )
+
+    @property
+    def motion(self) -> str:
+        """Translations and other motions of the platform: 3T, 2T1R, 1T2R, 3T3R …"""
+        parts = ((self.dof - self.turns, "T"), (self.turns, "R"))
+        return "".join(f"{count}{letter}" for count, letter in parts if count) or "at rest"
+
+
+@dataclass(frozen=True, eq=False)
+class OperationMode:
+    """An operation mode that was met: its signature, and one of its configurations."""
+
+    signature: Signature
+    at: ClosedConfiguration
+
+    def beside(self, other: Signature, labels: Sequence[str]) -> str:
+        """What the platform does in this mode, and what legs (``labels``, by observation) see there and not in the
+        mode of ``other``, or the other way round."""
+        own, sets = self.signature, sets_of(len(labels))
+        text = f"{own.dof} dof ({own.motion}), mobility {own.mobility}"
+        apart = [
+            (places, a[0])
+            for places, a, b in zip(sets, own.seen, other.seen, strict=False)
+            if own.dof != other.dof or a[0] > b[1] or b[0] > a[1]
+        ]
+        if not apart:
+            return text
+        places, seen = apart[0]
+        return f"{text}, legs {', '.join(labels[i] for i in places)} see {seen} of {own.dof}"
+
+
+def group_modes(found: Sequence[OperationMode]) -> list[list[OperationMode]]:
+    """The configurations, those together whose signatures agree, the largest group first."""
+    groups: list[list[OperationMode]] = []
+    for each in found:
+        home = next((group for group in groups if group[0].signature.agrees(each.signature)), None)
+        if home is None:
+            groups.append([each])
+        else:
+            home.append(each)
+    return sorted(groups, key=len, reverse=True)
+
+
+@lru_cache(maxsize=64)
+def sets_of(count: int) -> tuple[tuple[int, ...], ...]:
+    """The sets of observations whose ranks are compared, by their places."""
+    sizes = range(1, count + 1) if count <= LARGEST_WHOLE else (1, 2, count)
+    return tuple(each for size in sizes for each in combinations(range(count), size))
+
+
+@lru_cache(maxsize=64)
+def _choose_rows(sizes: tuple[int, ...]) -> Array:
+    """1 in the rows of the rates that belong to each set, (sets, rows)."""
+    owner = np.repeat(np.arange(len(sizes)), sizes)
+    sets = [np.isin(owner, places) for places in sets_of(len(sizes))]
+    return np.array(sets, dtype=float).reshape(len(sets), len(owner))

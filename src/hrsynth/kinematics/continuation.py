@@ -1,0 +1,225 @@
+"""Small steps from a configuration to a goal for the platform, in one working mode."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from ..budgets import LONGEST_STEP
+from ..geometry.ranks import kernel_basis, range_basis
+from ..geometry.vectors import Array
+from ..tolerances import AS_PRINTED, CLOSED, EASY_RANK, FOLLOWED, NEAR_FOLD, NEAREST, PASSED_BY, RANK_CUTOFF, SOLVED
+from .branch_tests import follows, nears
+from .configuration import ClosedConfiguration
+from .limits import wrists_beyond
+from .pinocchio_model import PinocchioModel
+from .platform_motion import PlatformMotion, PoseTask
+from .tasks import GuidedTask, Task, shorten_step, solve, system
+
+STRIDE = 0.1
+"""Longest step along the way to a pose (characteristic lengths, radians)."""
+HALVINGS = 10
+"""How often a step that fails is halved before the way is given up."""
+JUMP = 0.01
+"""Corrections below this are never jumps: on the edge of the workspace even exact steps need them."""
+EASING = 30
+"""Further steps at a goal's own place where the way to it was not straight."""
+
+
+def track(
+    here: ClosedConfiguration,
+    motion: PlatformMotion,
+    goal: GuidedTask,
+    halvings: int = HALVINGS,
+    home: Task | None = None,
+) -> tuple[ClosedConfiguration, float]:
+    """Lead a configuration to a goal by small steps: where it comes to, and the part of the way that it came (1: all of
+    it). A goal of more parts than there are freedoms is met where it is missed by no more than printed digits. What the
+    goal leaves free stays near ``home`` (default: the platform's pose at the zero configuration)."""
+    X = here.pose(motion.link)
+    home = home or motion.at_home()
+    error, rows = goal.error_and_jacobian(here.model, here.q)
+    longest = 1 / max(1, int(np.ceil(np.linalg.norm(error) / STRIDE)))
+    if are_dependent(here, rows):
+        here = _ease_towards(here, goal, X, longest)
+        there = _step_to(here, goal, home)
+        miss = float(np.linalg.norm(goal.error_and_jacobian(here.model, here.q)[0]))
+        if there is None and miss <= AS_PRINTED:
+            there = here
+        left = miss / max(float(np.linalg.norm(error)), SOLVED)
+        return (here, max(0.0, 1 - left)) if there is None else (there, 1.0)
+    came, step = 0.0, longest
+    while came < 1:
+        ahead = min(1.0, came + step)
+        ahead = 1.0 if ahead > 1 - SOLVED else ahead
+        there = _step_to(here, goal.towards(X, ahead), home, last=ahead == 1)
+        if there is not None:
+            here, came, step = there, ahead, min(longest, 2 * step)
+        elif step < longest * 0.5**halvings:
+            return here, came
+        else:
+            step /= 2
+    return here, 1.0
+
+
+def are_dependent(here: ClosedConfiguration, rows: Array) -> bool:
+    """Whether the parts of a goal with Jacobian ``rows`` (k, nv) cannot be chosen one by one with closed loops."""
+    return range_basis(rows @ here.kernel()[0], 1.0)[1].value < len(rows)
+
+
+def lead_to(
+    here: ClosedConfiguration, motion: PlatformMotion, goal: PoseTask, last: bool
+) -> tuple[ClosedConfiguration, bool]:
+    """The configuration at a goal of the whole pose nearby, and whether it was reached: where parts of the pose depend
+    on each other the nearest one, which is to be the goal's only at the ``last``."""
+    if motion.dof >= motion.translations.shape[1] + motion.rotations.shape[1]:
+        there, came = track(here, motion, goal)
+        return there, came == 1
+    there = nearest(here, replace(goal, directions=np.zeros((0, 3)), values=np.zeros(0), rotation=None), goal)
+    return there, not last or float(np.linalg.norm(goal.error_and_jacobian(there.model, there.q)[0])) < NEAREST
+
+
+def approach(here: ClosedConfiguration, goal: PoseTask, easing: int = EASING) -> ClosedConfiguration:
+    """As near to a goal as small steps with closed loops come, whether the platform can be there or not."""
+    error = float(np.linalg.norm(goal.error_and_jacobian(here.model, here.q)[0]))
+    return _ease_towards(here, goal, here.pose(goal.link), 1 / max(1, int(np.ceil(error / STRIDE))), easing)
+
+
+def _ease_towards(
+    here: ClosedConfiguration, goal: GuidedTask, X: Array, stride: float, easing: int = EASING
+) -> ClosedConfiguration:
+    """As near as steps with closed loops come to a goal of more parts than the platform has freedoms: the straight way
+    from the pose X need not be one that it can go."""
+    for fraction in (*np.arange(stride, 1, stride), *[1.0] * easing):
+        ahead = goal.towards(X, float(fraction))
+        if fraction == 1 and np.linalg.norm(ahead.error_and_jacobian(here.model, here.q)[0]) <= SOLVED:
+            break
+        there = next(_nearer(here, ahead, None, EASY_RANK, 3 * STRIDE), None)
+        if there is None:
+            break
+        here = there
+    return here
+
+
+def _step_to(here: ClosedConfiguration, goal: GuidedTask, home: Task, last: bool = True) -> ClosedConfiguration | None:
+    """The configuration at a goal nearby, moved towards ``home`` where parts are free; None where it jumps or lies
+    beyond a fold, in another working mode, or on one and is not the ``last``."""
+    model = here.model
+    error, rows = system(model, here.q, goal)
+    step = np.asarray(np.linalg.lstsq(rows, -error, rcond=RANK_CUTOFF)[0])
+    if np.max(np.abs(step), initial=0.0) > LONGEST_STEP:
+        return None
+    there = _correct_step(here, step, goal)
+    if there is None or _beyond(rows, system(model, there.q, goal)[1], last):
+        return None
+    return _drawn_home(there, goal, home, 1)
+
+
+def _beyond(before: Array, after: Array, last: bool) -> bool:
+    """Whether a fold lies between two configurations, given the Jacobians of loops and goal at both: the determinant of
+    their rows, on the range of the first, has changed its sign. On the fold itself nothing lies beyond it, but only the
+    ``last`` step may come there: working modes meet, and the next would go on in any."""
+    span, _ = range_basis(before)
+    turned = bool(np.linalg.slogdet(span.T @ before @ after.T @ span)[0] < 0)
+    if turned != last:
+        return turned
+    was, is_folded = (
+        bool(np.min(np.linalg.svd(span.T @ rows, compute_uv=False), initial=np.inf) <= NEAR_FOLD)
+        for rows in (before, after)
+    )
+    return not is_folded if last else is_folded and not was
+
+
+def _correct_step(here: ClosedConfiguration, step: Array, goal: GuidedTask | None) -> ClosedConfiguration | None:
+    """The closed configuration at the goal after a step; None where there is none, the correction is a jump, the step
+    does not follow the branch, or a wrist cannot make the turn."""
+    model = here.model
+    predicted = model.integrate(here.q, step)
+    q, residual = solve(model, predicted, goal, tolerance=SOLVED, iterations=15)
+    allowed = max(0.5 * float(np.linalg.norm(step)), JUMP)
+    if not residual <= CLOSED or np.linalg.norm(q - predicted) > allowed or wrists_beyond(model, q):
+        return None
+    there = ClosedConfiguration.of(model, q)
+    return there if follows(here, step, there) or nears(here, step, there) else None
+
+
+def nearest(here: ClosedConfiguration, goal: GuidedTask, home: Task) -> ClosedConfiguration:
+    """The configuration at ``goal`` nearest to ``home`` (a pose of the platform, other values): the projected gradient
+    vanishes, the loops are closed as well as floating point can; ``here`` itself where the goal is met but for its
+    printed digits."""
+    if np.linalg.norm(goal.error_and_jacobian(here.model, here.q)[0]) > SOLVED:
+        return here
+    return polish(_drawn_home(here, goal, home, 100), goal)
+
+
+def _drawn_home(here: ClosedConfiguration, goal: GuidedTask, home: Task, iterations: int) -> ClosedConfiguration:
+    """Minimise |home's error| with the goal held."""
+    for _ in range(iterations):
+        size = np.linalg.norm(home.error_and_jacobian(here.model, here.q)[0]) + SOLVED
+        there = next(
+            (
+                each
+                for each in _nearer(here, home, goal, RANK_CUTOFF, STRIDE, NEAREST)
+                if np.linalg.norm(home.error_and_jacobian(here.model, each.q)[0]) <= size
+            ),
+            None,
+        )
+        if there is None:
+            break
+        here = there
+    return here
+
+
+def _nearer(
+    here: ClosedConfiguration, task: Task, held: GuidedTask | None, cutoff: float, longest: float, least: float = 0.0
+) -> Iterator[ClosedConfiguration]:
+    """Where a Gauss-Newton step on a task's error leads, in the tangent space of the loops and of what is ``held``, and
+    ever smaller parts of it; nothing where the projected gradient is no more than ``least``."""
+    kernel = here.kernel()[0]
+    if held is not None:
+        kernel, _ = kernel_basis(
+            np.vstack([here.model.jacobian(here.q), held.error_and_jacobian(here.model, here.q)[1]])
+        )
+    error, rows = task.error_and_jacobian(here.model, here.q)
+    free = rows @ kernel
+    if np.linalg.norm(error @ free) <= least:
+        return
+    step = shorten_step(kernel @ np.linalg.lstsq(free, -error, rcond=cutoff)[0], longest)
+    for part in (1.0, 0.5, 0.25, 0.1, 0.02):
+        there = _correct_step(here, part * step, held)
+        if there is not None:
+            yield there
+
+
+def polish(here: ClosedConfiguration, goal: GuidedTask) -> ClosedConfiguration:
+    """Newton steps of minimum norm until the residual no longer falls: on the edge of the workspace a configuration
+    is only as exact as the square root of its residual."""
+    model, q = here.model, here.q
+    error, rows = system(model, q, goal)
+    for _ in range(20):
+        step = np.linalg.lstsq(rows, -error, rcond=FOLLOWED)[0]
+        trial = model.integrate(q, np.asarray(step, dtype=float))
+        trial_error, trial_rows = system(model, trial, goal)
+        if not np.linalg.norm(trial_error) < 0.9 * np.linalg.norm(error):
+            break
+        q, error, rows = trial, trial_error, trial_rows
+    return ClosedConfiguration.of(model, _on_fold(model, q, goal))
+
+
+def _on_fold(model: PinocchioModel, q: Array, goal: GuidedTask) -> Array:
+    """The configuration on a fold of the way (the edge of the workspace) where ``q`` cannot be told from it: where the
+    weak singular value of loops and goal vanishes, if the residual stays within ``SOLVED`` there."""
+    rows = system(model, q, goal)[1]
+    left, values, right = np.linalg.svd(rows, full_matrices=False)
+    weak = np.nonzero((values < NEAR_FOLD) & (values > FOLLOWED))[0]
+    if len(weak) != 1:
+        return q
+    across, along, size = left[:, weak[0]], right[weak[0]], float(values[weak[0]])
+    ahead = system(model, model.integrate(q, PASSED_BY * along), goal)[1]
+    slope = (float(across @ ahead @ along) - size) / PASSED_BY
+    if abs(slope) * PASSED_BY < size:
+        return q
+    there = model.integrate(q, -size / slope * along)
+    return there if np.linalg.norm(system(model, there, goal)[0]) <= SOLVED else q

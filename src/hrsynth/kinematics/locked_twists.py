@@ -1,0 +1,174 @@
+"""What a leg still allows its end when what is measured of it is held: the locked twist system T_i.
+
+Computed from the screws of the leg's own joints, without the engine's Jacobians: an independent path to the same ranks.
+Lengths in characteristic lengths; twists at the base frame's origin, base axes.
+
+Source: docs/pages/theory.md, section 7.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from ..description.assembly.loops import SINGLE
+from ..description.assembly.zero_configuration import zeroed_at
+from ..geometry.ranks import kernel_basis, range_bases, range_basis, spectra
+from ..geometry.screws import point_velocity
+from ..geometry.vectors import Array, hat
+from ..mechanism import Coupling, Joint, Mechanism, Observation
+from ..mechanism.legs import Leg
+from ..mechanism.screws import constraints
+from ..tolerances import INVERTED
+from .configuration import ClosedConfiguration
+from .velocity_relation import ObservationModel
+
+
+class _Bodies:
+    """Constraint and velocity matrices on the stacked twists of some links, all at the base frame's origin."""
+
+    def __init__(self, at: ClosedConfiguration, links: Sequence[str], joints: Sequence[Joint]) -> None:
+        self.at = at
+        self.place = {link: i for i, link in enumerate(links)}
+        pose = cache(at.pose)
+        self.A = constraints(joints, self.place, lambda joint: joint_at(at, joint, pose))
+        gears = [each for each in at.model.mechanism.couplings if {each.predecessor, each.successor} <= {*links}]
+        self.A = np.vstack([self.A, *(self._coupling_row(each, pose) for each in gears)])
+
+    def _coupling_row(self, coupling: Coupling, pose: Callable[[str], Array]) -> Array:
+        """A coupling's row: the successor's rate less ratio × the predecessor's (metres, radians)."""
+        row, mechanism = np.zeros((1, 6 * len(self.place))), self.at.model.mechanism
+        for link, factor in ((coupling.successor, 1.0), (coupling.predecessor, -coupling.ratio)):
+            joint = mechanism.carrier(coupling, link)
+            (axis,), slides = joint_at(self.at, joint, pose)[1], joint.type.slides
+            part = np.r_[axis * self.at.model.length, 0 * axis] if slides else np.r_[0 * axis, axis]
+            for end, sign in ((joint.successor, factor), (joint.predecessor, -factor)):
+                if end in self.place:
+                    row[0, 6 * self.place[end] : 6 * self.place[end] + 6] += sign * part
+        return row
+
+    def pose(self, link: str) -> Array:
+        """X_BL with the position in characteristic lengths."""
+        X = self.at.pose(link).copy()
+        X[:3, 3] /= self.at.model.length
+        return X
+
+    def velocity(self, link: str) -> Array:
+        """The map to the twist of a link's frame at its origin, (6, 6 links)."""
+        V = np.zeros((6, 6 * len(self.place)))
+        if link in self.place:
+            start = 6 * self.place[link]
+            V[:, start : start + 6] = np.eye(6)
+            V[:3, start + 3 : start + 6] = -hat(self.pose(link)[:3, 3])
+        elif link != self.at.model.mechanism.base:
+            raise ValueError(f"the twist of {link} is not among the unknowns")
+        return V
+
+    def rates(self, observations: Sequence[Observation], reference: str) -> Array:
+        """The rates of observations, stacked, lengths in them in characteristic lengths."""
+        found, length = [np.zeros((0, self.A.shape[1]))], self.at.model.length
+        metric = np.repeat([length, 1.0], 3)[:, None]
+        for each in observations:
+            links = each.seen_from or reference, each.link
+            rate = each.rate(*map(self.at.pose, links), *(metric * self.velocity(link) for link in links))
+            found.append((rate.T / length ** np.asarray(each.dimension)).T)
+        return np.vstack(found)
+
+
+def leg_twists(at: ClosedConfiguration, leg: Leg, locks: Sequence[Observation], reference: str) -> Array:
+    """An orthonormal basis (6, k) of T_i: the twists of the link on which the leg ends that its joints and held
+    measurements allow. Raises ``ValueError`` where a measurement is seen from a link outside the leg."""
+    return leg_twists_together([at], leg, locks, reference)[0]
+
+
+def leg_twists_together(
+    samples: Sequence[ClosedConfiguration], leg: Leg, locks: Sequence[Observation], reference: str
+) -> list[Array]:
+    """:func:`leg_twists` at several configurations."""
+    mechanism, rows = samples[0].model.mechanism, []
+    links = (leg.platform_link, *(link for link in leg.links if link not in (leg.platform_link, mechanism.base)))
+    for at in samples:
+        bodies = _Bodies(at, links, [mechanism.joints[name] for name in leg.joints])
+        rows.append(np.vstack([bodies.A, bodies.rates(locks, reference)]))
+    return [basis for basis, _ in range_bases([found.kernel[:6] for found in spectra(rows)], 1.0)]
+
+
+def interaction(at: ClosedConfiguration, observation_model: ObservationModel) -> Array:
+    """Mᵀ on an orthonormal basis of the platform's twists, (rows, d), by the screws of all joints: u̇ = Mᵀ x.
+
+    Where observed links move while the platform rests, that part of u̇ is left out of it."""
+    mechanism = at.model.mechanism
+    links = [link for link in mechanism.links if link != mechanism.base]
+    bodies = _Bodies(at, links, list(mechanism.joints.values()))
+    kernel, _ = kernel_basis(bodies.A)
+    V = bodies.velocity(observation_model.platform)
+    if observation_model.point is not None:
+        V = point_velocity(V, at.pose(observation_model.platform)[:3, :3] @ observation_model.point / at.model.length)
+    moving, rates = V @ kernel, bodies.rates(observation_model.observations, observation_model.reference) @ kernel
+    still, _ = kernel_basis(moving, 1.0)
+    hidden = range_basis(rates @ still, 1.0)[0] if still.shape[1] else np.zeros((len(rates), 0))
+    basis, _ = range_basis(moving, 1.0)
+    found: Array = rates @ np.linalg.pinv(basis.T @ moving, rcond=INVERTED)
+    return found - hidden @ (hidden.T @ found)
+
+
+def joint_at(
+    at: ClosedConfiguration, joint: Joint, pose: Callable[[str], Array] | None = None
+) -> tuple[Array, list[Array]]:
+    """Centre (characteristic lengths) and axes of a joint where a configuration, whose links are at these poses, has
+    them."""
+    point, axes = carry_joint(at.model.mechanism, joint, pose or at.pose)
+    return point / at.model.length, axes
+
+
+def carry_joint(mechanism: Mechanism, joint: Joint, pose: Callable[[str], Array]) -> tuple[Array, list[Array]]:
+    """Centre (m) and axes of a joint, carried by links that are at these poses (4, 4)."""
+
+    carriers = [pose(link) @ mechanism.links[link].inverse for link in joint.links[: max(1, len(joint.axes))]]
+    axes = [D[:3, :3] @ axis for D, axis in zip(carriers, joint.axes, strict=False)]
+    return carriers[0][:3, :3] @ joint.point + carriers[0][:3, 3], axes
+
+
+def rezero(at: ClosedConfiguration) -> Mechanism:
+    """The same mechanism with ``at`` as its zero configuration."""
+    mechanism, model = at.model.mechanism, at.model
+    step = model.difference(model.q0, at.q)
+    known = {
+        name: float(step[model.coordinates[name][0]]) * (model.length if joint.type.slides else 1.0)
+        for name, joint in mechanism.joints.items()
+        if joint.type in SINGLE and name in model.coordinates
+    }
+    return zeroed_at(mechanism, {name: at.pose(name) for name in mechanism.links}, known)
+
+
+@dataclass(frozen=True, eq=False)
+class Split:
+    """A twist system taken apart at a point B: the translations in it, (3, k), the rotations about axes through B in
+    it, (3, m), and whether that is all of it."""
+
+    translations: Array
+    rotations: Array
+    whole: bool
+
+
+def split(twists: Array, point: Array) -> Split:
+    """Take a twist system (6, k) apart at a point (3,)."""
+    return split_together([twists], [point])[0]
+
+
+def split_together(systems: Sequence[Array], points: Sequence[Array]) -> list[Split]:
+    """:func:`split` of several systems, each at its own point."""
+    there = [
+        np.vstack([point_velocity(twists, point), twists[3:]]) for twists, point in zip(systems, points, strict=True)
+    ]
+    parts = []
+    for part, other in ((slice(3), slice(3, 6)), (slice(3, 6), slice(3))):
+        alone = spectra([twists[other] for twists in there], 1.0)
+        parts.append(range_bases([twists[part] @ each.kernel for twists, each in zip(there, alone, strict=True)], 1.0))
+    return [
+        Split(moved, turned, moved.shape[1] + turned.shape[1] == twists.shape[1])
+        for (moved, _), (turned, _), twists in zip(*parts, systems, strict=True)
+    ]

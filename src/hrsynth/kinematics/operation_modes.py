@@ -1,0 +1,189 @@
+"""Which operation mode samples are of, and the mechanisms that have none to draw (docs/pages/theory.md, section 5).
+
+A zero configuration may be a branch point, or one at which nothing moves to first order; loops may be shaky. What is
+refused is said with what was seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..errors import BadMechanism, BranchPoint, InfinitesimalMobility, NotSampled, UndefinedValue
+from ..geometry.ranks import kernel_basis, largest_angle
+from ..tolerances import (
+    CLOSED,
+    CONTINUED,
+    CONTINUED_STEP,
+    EXACT,
+    NUDGE,
+    RANK_GAP,
+    SHARP,
+    SOLVED,
+    STEADY_TANGENT,
+    SURELY_SOMETHING,
+)
+from .branch_tests import OperationMode, Signature, group_modes
+from .configuration import ClosedConfiguration
+from .tasks import TaskBatch, solve, solve_together
+from .velocity_relation import ObservationModel, relation
+from .walking import HALVED, any_velocity, random_walk, step_along
+
+ASKED = 40
+"""Configurations beyond a singularity that are asked whether they may be of another operation mode."""
+MET = 6
+"""How many of those that may are confirmed by walks from there."""
+BEYOND = 16
+"""Steps of such a walk."""
+LEAVING = 24
+"""Steps in random directions by which the branches at a singular zero configuration are sought."""
+SHAKEN = 3
+"""Samples at which a mechanism is seen to be shaky before it is said to be."""
+NAMED = 6
+"""Links that a refusal names."""
+STEPS = 4
+"""Steps from the zero configuration to a sample."""
+
+
+def other_modes(
+    beyond: Sequence[ClosedConfiguration], own: Signature, observation_model: ObservationModel
+) -> tuple[OperationMode, ...]:
+    """The operation modes other than one's own to which configurations belong, each confirmed by walks from there."""
+    some = beyond[:: max(1, len(beyond) // ASKED)]
+    strange = [at for at in some if (each := mode_at(at, observation_model)) and not each.signature.agrees(own)]
+    found = group_modes(
+        [
+            each
+            for at in strange[:MET]
+            if (far := far_walks(at, BEYOND)) and (each := mode_at(firmest(far), observation_model))
+        ]
+    )
+    return tuple(group[0] for group in found if not group[0].signature.agrees(own))
+
+
+def mode_at(at: ClosedConfiguration, observation_model: ObservationModel) -> OperationMode | None:
+    """The operation mode that a configuration shows; None where its ranks are not clear, as beside a singularity."""
+    if (steady := well_closed(at)) is None or steady.kernel()[1].dropped > EXACT:
+        return None
+    try:
+        found = relation(steady, observation_model)
+    except UndefinedValue:
+        return None
+    return OperationMode(Signature.of(found), at) if found.gap >= RANK_GAP else None
+
+
+def ways_out(
+    start: ClosedConfiguration, observation_model: ObservationModel, rng: np.random.Generator, *, singular: bool
+) -> list[ClosedConfiguration]:
+    """Configurations beside a ``singular`` zero configuration, or beside one at which nothing that is asked moves to
+    first order (a dead centre); raises ``BranchPoint`` where they are not of one mode, ``BadMechanism`` where nothing
+    that is asked moves there either."""
+    found = [
+        each
+        for _ in range(LEAVING)
+        if (beside := step_along(start, any_velocity(start, rng), leaving=singular)) is not None
+        and (each := mode_at(beside, observation_model)) is not None
+    ]
+    if not found:
+        raise NotSampled(start.model.mechanism.name, 0, 1, LEAVING)
+    if all(each.signature.dimension == 0 for each in found):
+        _refuse_unmoved([each.at for each in found])
+    groups = group_modes(found)
+    require_one(
+        groups,
+        observation_model,
+        "several operation modes meet at the zero configuration (its loops have mobility "
+        f"{start.kernel()[0].shape[1]} there)",
+    )
+    return [each.at for each in found]
+
+
+def _refuse_unmoved(found: Sequence[ClosedConfiguration]) -> None:
+    """Raise ``BadMechanism`` that names the links that do move."""
+    mechanism = found[0].model.mechanism
+    moving = [
+        link
+        for link in mechanism.links
+        if any(np.abs(at.velocity(link) @ at.kernel()[0]).max() > SURELY_SOMETHING for at in found)
+    ]
+    named = ", ".join(moving[:NAMED]) + (f" and {len(moving) - NAMED} more" if moving[NAMED:] else "")
+    raise BadMechanism(
+        f"{mechanism.name}: neither the platform nor a watched segment moves, but other links do "
+        f"({named}; mobility {found[0].kernel()[0].shape[1]})",
+        None,
+        "a platform or a watched segment that moves (--observe LINK)",
+    )
+
+
+def require_motions(found: Sequence[ClosedConfiguration]) -> None:
+    """Raise ``Shaky`` where ker A is larger than the tangent space of what closes, all along: so where loops repeat
+    each other to first order and not beyond (docs/pages/theory.md, section 1)."""
+    done = 0
+    for at in sorted(found, key=lambda each: -each.kernel()[1].weakest)[:SHAKEN]:
+        mobility = at.kernel()[0].shape[1]
+        if (ways := ways_on(at)) is None or ways == mobility:
+            return
+        done = max(done, ways)
+    if found:
+        raise InfinitesimalMobility(found[0].model.mechanism.name, found[0].kernel()[0].shape[1], done)
+
+
+def ways_on(at: ClosedConfiguration) -> int | None:
+    """In how many independent ways small steps along ker A lead to closed configurations; None where one does not
+    close. Where no constraint is redundant that is the mobility."""
+    model, (kernel, rank) = at.model, at.kernel()
+    if rank.value == len(model.residual(at.q)):
+        return kernel.shape[1]
+    predicted = [model.integrate(at.q, CONTINUED_STEP * each) for each in kernel.T]
+    closed = solve_together(TaskBatch(model, None), predicted, [None] * len(predicted), tolerance=SOLVED)
+    if any(residual > CLOSED for _, residual in closed):
+        return None
+    steps = np.array([kernel.T @ model.difference(at.q, q) for q, _ in closed]) / CONTINUED_STEP
+    return int(np.sum(np.linalg.svd(steps, compute_uv=False) > CONTINUED))
+
+
+def require_one(groups: Sequence[Sequence[OperationMode]], observation_model: ObservationModel, what: str) -> None:
+    if len(groups) > 1:
+        first, at = groups[0][0].signature, groups[0][0].at
+        others = [groups[1][0].signature, *[first] * (len(groups) - 1)]
+        raise BranchPoint(
+            at.model.mechanism.name,
+            what,
+            [
+                group[0].beside(other, [o.leg for o in observation_model.observations])
+                for group, other in zip(groups, others, strict=True)
+            ],
+        )
+
+
+def far_walks(start: ClosedConfiguration, steps: int = STEPS) -> list[ClosedConfiguration]:
+    """The configurations of two random walks in all of the mechanism's freedoms, the second half of each."""
+    try:
+        walk = list(random_walk(start, 2 * steps, steps=steps))
+    except NotSampled:
+        return []
+    return [at for number, at in enumerate(walk) if number % steps >= steps // 2]
+
+
+def firmest(found: Sequence[ClosedConfiguration]) -> ClosedConfiguration:
+    """The configuration farthest from a singularity of the loops."""
+    return max(found, key=lambda at: at.kernel()[1].weakest)
+
+
+def well_closed(here: ClosedConfiguration) -> ClosedConfiguration | None:
+    """The same configuration, its loops closed so well that T_qC does not turn by the residual; None where numbers do
+    not allow that, near a singularity."""
+    if here.residual <= STEADY_TANGENT * here.kernel()[1].weakest ** 2:
+        return here
+    model = here.model
+    here = ClosedConfiguration.of(model, solve(model, here.q, tolerance=SHARP, iterations=5)[0])
+    aside, _ = kernel_basis(model.jacobian(model.integrate(here.q, NUDGE * here.loops.right[:, -1])))
+    turn = largest_angle(here.kernel()[0], aside) / NUDGE  # radians for each unit of the weakest direction
+    return here if turn * max(here.residual, SHARP) / here.strengths[-1] <= STEADY_TANGENT else None
+
+
+def is_regular(start: ClosedConfiguration, rng: np.random.Generator) -> bool:
+    """Whether some step from a configuration, however short, follows its branch: not so where branches meet."""
+    velocity = any_velocity(start, rng)
+    return any(step_along(start, velocity, part) is not None for part in (*HALVED[::3], 1e-4, 1e-5))

@@ -1,0 +1,249 @@
+"""The relation ρ between the platform's twist and the rates of what is observed.
+
+Source: docs/pages/theory.md, section 2; as a graph, MMT eq. 7.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ..geometry.ranks import Rank, range_bases, range_basis, spectra
+from ..geometry.screws import point_velocity
+from ..geometry.vectors import Array
+from ..mechanism.observation import Observation
+from ..results import Value
+from ..tolerances import INVERTED
+from .configuration import ClosedConfiguration, measure, measure_together
+from .tasks import PoseAndValuesTask
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ObservationModel(Value):
+    """What is asked of a mechanism: the twist t of ``platform`` and the rates of ``observations`` seen from
+    ``reference``; ``bodies`` are further links whose twists count too. In a formation t is the twists of the platform
+    and of ``others``, one below the other.
+
+    Where ``point`` is given, t is the velocity of that point alone, in the platform's frame (a point body).
+    """
+
+    platform: str
+    point: Array | None
+    reference: str
+    observations: tuple[Observation, ...]
+    bodies: tuple[str, ...] = ()
+    others: tuple[str, ...] = ()
+
+    @property
+    def twist_rows(self) -> int:
+        """Rows of t: 3 for a point body, else 6 for each link."""
+        return 6 * (1 + len(self.others)) if self.point is None else 3
+
+    @property
+    def of_platform(self) -> ObservationModel:
+        """The platform's own twist alone, nothing observed."""
+        return replace(self, observations=(), bodies=(), others=())
+
+    def target(self, at: ClosedConfiguration) -> PoseAndValuesTask:
+        """The platform pose and the measured values of a configuration."""
+        X, _, values, _ = measure(at.model, at.q, self.reference, self.observations, (self.platform,))
+        return PoseAndValuesTask(
+            self.platform, X[0], self.point, self.reference, tuple(zip(self.observations, values, strict=True))
+        )
+
+    def targets(self, at: Sequence[ClosedConfiguration]) -> list[PoseAndValuesTask]:
+        """:meth:`target` of several configurations of one twin."""
+        *_, X, _, values, _ = measure_together(
+            at[0].model, [each.q for each in at], self.reference, self.observations, (self.platform,)
+        )
+        ends = np.cumsum(self.sizes, dtype=int)
+        return [
+            PoseAndValuesTask(
+                self.platform,
+                x[0],
+                self.point,
+                self.reference,
+                tuple(zip(self.observations, np.split(own, ends)[:-1], strict=True)),
+            )
+            for x, own in zip(X, values, strict=True)
+        ]
+
+    def rows(self, at: ClosedConfiguration, *, blind: frozenset[str] = frozenset()) -> Array:
+        """The map from joint rates to (t, measured rates, twists of ``bodies``), shape (rows, nv); links in ``blind``
+        are not in the mechanism, their rates are zero."""
+        seen = tuple(o for o in self.observations if o.link not in blind)
+        X, V, _, rates = measure(at.model, at.q, self.reference, seen, (self.platform, *self.others, *self.bodies))
+        found, own = iter(rates), 1 + len(self.others)
+        parts = (
+            [*V[:own]] if self.point is None else [point_velocity(V[0], X[0][:3, :3] @ self.point / at.model.length)]
+        )
+        parts += [np.zeros((o.size, at.model.nv)) if o.link in blind else next(found) for o in self.observations]
+        return np.vstack([*parts, *V[own:]])
+
+    def rows_together(self, at: Sequence[ClosedConfiguration], blind: frozenset[str] = frozenset()) -> list[Array]:
+        """:meth:`error_and_jacobian` at several configurations of one twin."""
+        if len(at) < 2:
+            return [self.rows(each, blind=blind) for each in at]
+        model, links = at[0].model, (self.platform, *self.others, *self.bodies)
+        seen = [o for o in self.observations if o.link not in blind]
+        *_, X, V, _, rates = measure_together(model, [each.q for each in at], self.reference, seen, links)
+        own, n = 1 + len(self.others), len(at)
+        t = (
+            V[:, :own].reshape(n, -1, model.nv)
+            if self.point is None
+            else np.array(
+                [
+                    point_velocity(v, x[:3, :3] @ self.point / model.length)
+                    for v, x in zip(V[:, 0], X[:, 0], strict=True)
+                ]
+            )
+        )
+        if len(seen) < len(self.observations):
+            shown = np.repeat([o.link not in blind for o in self.observations], self.sizes)
+            rates, some = np.zeros((n, len(shown), model.nv)), rates
+            rates[:, shown] = some
+        return list(np.concatenate([t, rates, V[:, own:].reshape(n, -1, model.nv)], axis=1))
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Rows of each observation."""
+        return tuple(o.size for o in self.observations)
+
+    @property
+    def size(self) -> int:
+        """Rows of all that is asked."""
+        return self.twist_rows + sum(self.sizes) + 6 * len(self.bodies)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class VelocityRelation(Value):
+    """ρ(q) as an orthonormal basis (rows: t, then measured rates, then bodies), with mobility and the smallest gap."""
+
+    basis: Array
+    twist_rows: int
+    sizes: tuple[int, ...]
+    """Rows of each observation's rate."""
+    mobility: int
+    gap: float
+
+    @property
+    def dimension(self) -> int:
+        """dim ρ."""
+        return self.basis.shape[1]
+
+    @property
+    def twist_part(self) -> Array:
+        """The rows of t, shape (twist rows, dim ρ)."""
+        return self.basis[: self.twist_rows]
+
+    @property
+    def rates(self) -> Array:
+        """The rows of the measured rates, shape (measured rows, dim ρ)."""
+        return self.basis[self.twist_rows : self.twist_rows + sum(self.sizes)]
+
+    def rows_of(self, place: int) -> slice:
+        """The rows of one observation's rate in ``basis``."""
+        start = self.twist_rows + sum(self.sizes[:place])
+        return slice(start, start + self.sizes[place])
+
+    @cached_property
+    def _platform(self) -> tuple[Array, Rank]:
+        return range_basis(self.twist_part, 1.0)
+
+    @property
+    def dof(self) -> Rank:
+        """dim of the platform's twists: the robot's dof."""
+        return self._platform[1]
+
+    @property
+    def twists(self) -> Array:
+        """An orthonormal basis of the platform's twists."""
+        return self._platform[0]
+
+    @cached_property
+    def _unseen(self) -> tuple[Array, Rank, Rank]:
+        look([self])
+        found: tuple[Array, Rank, Rank] = self.__dict__["_unseen"]
+        return found
+
+    @property
+    def seen(self) -> Rank:
+        """The rank of the measured rates on ρ: what decides which twists are lost."""
+        return self._unseen[2]
+
+    @property
+    def unobserved_twists(self) -> Array:
+        """A basis of {t : (t, 0) ∈ ρ}, the twists that no observation sees, shape (twist rows, RO)."""
+        return self._unseen[0]
+
+    @property
+    def RO(self) -> Rank:
+        """RO = dim {t : (t, 0) ∈ ρ}, with its gap."""
+        return self._unseen[1]
+
+    @cached_property
+    def RI(self) -> int:
+        """RI = dim {u̇ : (0, u̇) ∈ ρ}: where it is not zero, Mᵀ does not exist."""
+        look([self])
+        return int(self.__dict__["RI"])
+
+    @cached_property
+    def rank(self) -> int:
+        """Freedoms of the platform that the observations see: dof − RO."""
+        return self.dof.value - self.unobserved_twists.shape[1]
+
+
+def look(found: Sequence[VelocityRelation]) -> None:
+    """Take several relations apart together: what no observation sees in each, and what moves while the platform
+    rests."""
+    still = spectra([each.rates for each in found], 1.0)
+    unseen = range_bases([each.twist_part @ seen.kernel for each, seen in zip(found, still, strict=True)], 1.0)
+    resting = spectra([each.twist_part for each in found], 1.0)
+    beside = range_bases([each.rates @ at.kernel for each, at in zip(found, resting, strict=True)], 1.0)
+    for each, seen, (basis, rank), (_, free) in zip(found, still, unseen, beside, strict=True):
+        each.__dict__["_unseen"] = basis, Rank(rank.value, min(rank.gap, seen.rank.gap)), seen.rank
+        each.__dict__["RI"] = free.value
+
+
+def platform_motions(at: ClosedConfiguration, observation_model: ObservationModel) -> Array:
+    """Joint velocities (nv, dof), without idle motions, that move the platform by an orthonormal basis of its twists
+    (characteristic lengths)."""
+    kernel, _ = at.kernel()
+    image = observation_model.rows(at)[: observation_model.twist_rows] @ kernel
+    moves, _ = range_basis(image, 1.0)
+    return np.asarray(kernel @ np.linalg.lstsq(image, moves, rcond=INVERTED)[0])
+
+
+def relation(
+    at: ClosedConfiguration, observation_model: ObservationModel, *, blind: frozenset[str] = frozenset()
+) -> VelocityRelation:
+    """ρ at a closed configuration."""
+    return relations([at], observation_model, [observation_model.rows(at, blind=blind)])[0]
+
+
+def relations(
+    at: Sequence[ClosedConfiguration], observation_model: ObservationModel, rows: Sequence[Array]
+) -> list[VelocityRelation]:
+    """ρ at several closed configurations of one twin, from the rows that the question has there."""
+    return _relations(at, rows, observation_model.twist_rows, observation_model.sizes)
+
+
+def relation_of(at: ClosedConfiguration, observation_model: ObservationModel, rows: Array) -> VelocityRelation:
+    """ρ between the platform's twist and what ``rows`` (measured, nv) make of the joint rates, each a measurement of
+    its own: the motors' coordinates, for one."""
+    twist = replace(observation_model, observations=(), bodies=()).rows(at)
+    return _relations([at], [np.vstack([twist, rows])], observation_model.twist_rows, (1,) * len(rows))[0]
+
+
+def _relations(
+    at: Sequence[ClosedConfiguration], rows: Sequence[Array], twist_rows: int, sizes: tuple[int, ...]
+) -> list[VelocityRelation]:
+    kernels = [each.kernel() for each in at]
+    bases = range_bases([moved @ kernel for moved, (kernel, _) in zip(rows, kernels, strict=True)], 1.0)
+    return [
+        VelocityRelation(basis, twist_rows, sizes, kernel.shape[1], min(constraints.gap, rank.gap))
+        for (kernel, constraints), (basis, rank) in zip(kernels, bases, strict=True)
+    ]

@@ -1,0 +1,143 @@
+"""A file that is looked at: its document, what the readers make of it, and what they refuse."""
+
+from __future__ import annotations
+
+import copy
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, TypeVar
+
+from ..description import formats, xml
+from ..description.file_format import RobotFile
+from ..description.formats.urdf import xacro
+from ..description.jointgraph import JointGraph
+from ..description.overrides import Overrides
+from ..description.reading import robot_file, understood
+from ..errors import BadRobotFile, HrsynthError
+from ..mechanism.model import Mechanism
+
+Found = TypeVar("Found")
+_HEAD = re.compile(rb"(?>\s|<\?.*?\?>|<!--.*?-->)*", re.DOTALL)
+_TAIL = re.compile(rb"</[^<>]*>((?>\s|<!--.*?-->)*)$", re.DOTALL)
+"""What stands before and after the root element."""
+DIALECTS = {"robot": "urdf", "mujoco": "mjcf", "sdf": "sdf"}
+"""The names of root elements, and what their documents are called here."""
+
+
+class LintedFile:
+    """A robot file, opened once; ``text`` stands for its content where that is being mended. What a person says of it
+    (platform, base …) is in ``given``; ``readers`` are the programs that shall read it, ``other`` is a file of the same
+    robot.
+
+    Raises ``BadRobotFile`` for what cannot be opened, or is no document.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        given: Overrides | None = None,
+        text: bytes | None = None,
+        readers: tuple[str, ...] = (),
+        other: LintedFile | None = None,
+    ) -> None:
+        self.given, self.readers, self.other = given or Overrides(), readers, other
+        opened = robot_file(Path(path), strict=False)
+        if opened.root is None and isinstance(graph := formats.read(opened), JointGraph):  # settings beside a document
+            opened = robot_file(Path(graph.file), strict=False)
+        self.path, self.file = opened.path, str(opened.path)
+        self.data = xml.content(opened.path) if text is None else text
+        self.root = opened.root if text is None else xml.document(text, self.file)
+        self._opened = replace(opened, root=self.root)
+        self.expanded = (
+            text is None and self.root is not None and xacro.is_needed(xml.document(self.data, self.file, []))
+        )
+        """Whether a program made the document of what stands in the file, which no mend can be written to."""
+        self._remembered: dict[str, Any] = {}
+        self.dialect = None if self.root is None else DIALECTS.get(str(self.root.tag))
+
+    def open(self, *, strict: bool = False) -> RobotFile:
+        """The file as readers get it, which may change its document."""
+        return replace(
+            self._opened, root=copy.deepcopy(self.root), strict=strict and not self.given.any, as_spelt=not strict
+        )
+
+    def graph(self) -> JointGraph:
+        """What the file says before anything is put together; raises ``BadRobotFile``."""
+        found = formats.read(self.open())
+        assert isinstance(found, JointGraph)
+        return found
+
+    @cached_property
+    def said(self) -> JointGraph | None:
+        """The same, None where it is refused; nothing may change it."""
+        try:
+            return self.graph()
+        except HrsynthError:
+            return None
+
+    @cached_property
+    def _read(self) -> Mechanism | HrsynthError:
+        try:
+            return understood(self.open(strict=True), self.given)
+        except HrsynthError as error:
+            return error
+
+    @property
+    def refusal(self) -> HrsynthError | None:
+        """Why the file is not read as every command reads it."""
+        return self._read if isinstance(self._read, HrsynthError) else None
+
+    @cached_property
+    def mechanism(self) -> Mechanism | None:
+        """The mechanism that every command reads; of a file that its own dialect refuses, what the tolerant reader
+        makes of it; None where there is none."""
+        if isinstance(self._read, Mechanism):
+            return self._read
+        try:
+            return understood(self.open(), self.given)
+        except HrsynthError:
+            return None
+
+    def remember(self, name: str, make: Callable[[], Found]) -> Found:
+        """What is computed once for several rules."""
+        if name not in self._remembered:
+            self._remembered[name] = make()
+        found: Found = self._remembered[name]
+        return found
+
+    def element(self, line: int | None, *tags: str, name: str | None = None) -> xml.Element | None:
+        """The element with one of these tags that starts in a line of this file, where there is one only; of several in
+        one line that with the name."""
+        if self.root is None or line is None or isinstance(line, xml.SourceLine):
+            return None
+        found = [each for each in self.root.iter(*tags) if xml.line(each) == line]
+        if len(found) > 1:
+            found = [each for each in found if each.get("name") == name]
+        return found[0] if len(found) == 1 else None
+
+    def after(self) -> LintedFile:
+        """The file as its document is now."""
+        return LintedFile(self.path, self.given, self.text(), self.readers, self.other)
+
+    def text(self) -> bytes:
+        """The document as text."""
+        from lxml import etree
+
+        assert self.root is not None
+        head, tail = _HEAD.match(self.data), _TAIL.search(self.data)
+        text = etree.tostring(self.root, encoding="utf-8", with_tail=False)
+        return (head[0] if head else b"") + text + (tail[1] if tail else b"")
+
+
+def defects_of(error: HrsynthError) -> list[tuple[int | None, str]]:
+    """Line and text of all that an error says."""
+    if isinstance(error, BadRobotFile):
+        found = []
+        for each in error.defects:
+            text = each.what + ("" if each.value is None else f", found {each.value}")
+            found.append((each.line, text + ("" if each.allowed is None else f", allowed: {each.allowed}")))
+        return found
+    return [(None, " ".join(str(error).split()))]

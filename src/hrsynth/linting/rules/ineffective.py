@@ -1,0 +1,60 @@
+"""What a file says to no effect: elements and attributes that its format does not have, legs that are none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ...description import formats
+from ...errors import BadRobotFile, HrsynthError
+from ...mechanism.legs import decompose
+from ...mechanism.normal import normal_form
+from ..findings import LintRule, RuleHit
+from ..linted_file import LintedFile, defects_of
+
+
+def _unknown(file: LintedFile) -> Iterator[RuleHit]:
+    if file.root is None or file.dialect is None:
+        return
+    for each in formats.vocabulary(file.dialect).unknown(file.root):
+        near, severity = each.remedy, "error" if each.meant else "warning" if each.remedy else None
+        yield RuleHit(
+            each.line,
+            f"unknown {each.place}, found {each.found}{near and f', nearly {near}'}",
+            advice=near and f"write {near}",
+            severity=severity,
+        )
+
+
+def _legs(file: LintedFile) -> Iterator[RuleHit]:
+    robot = file.mechanism
+    if file.refusal is not None or robot is None or not robot.observations:
+        return
+    try:
+        decompose(normal_form(robot).mechanism)
+    except BadRobotFile as error:
+        for line, text in defects_of(error):
+            yield RuleHit(line, text)
+    except HrsynthError:  # told by other rules, or by the questions that need legs
+        return
+
+
+RULES = (
+    LintRule(
+        "element-unknown",
+        "note",
+        "an element or attribute that the format does not have",
+        "Most readers ignore it silently, and use the default instead of what it was meant to say: an axis along "
+        "x, no motor, no limit. This program refuses one that is a misspelling (an error).",
+        "nothing, if another program reads it",
+        _unknown,
+    ),
+    LintRule(
+        "observe-legs",
+        "error",
+        "observed directions that contradict the robot's legs",
+        "A link that is in no leg, one label for two legs, two labels for one: the file is read, but commands "
+        "that watch legs refuse it.",
+        "correct the link or label named in the message",
+        _legs,
+    ),
+)

@@ -1,0 +1,201 @@
+"""The atlas of aspects → a picture: the table of modes, and of three rods on cranks the curve of Type 2 singularities,
+among the directions of two rods and on the surface of poses with the third one's direction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..analysis.aspects.aspects import AspectTable
+from ..analysis.aspects.singularity_slice import SingularitySlice
+from ..analysis.aspects.three_cranks import CrankPlace, mode_counts
+from ..analysis.aspects.verdicts import SAME, SEPARATED, UNDECIDED
+from ..errors import BadRequest
+from ..geometry.vectors import Array
+from . import plots
+from .figure_format import PNG, Paper, print_figure
+from .modes import why_undrawn
+from .palette import MEANINGS, PAGE, SERIES, tint
+from .plots import cell_edges, entry, in_style, panels
+
+CELLS = {SAME: (tint(PAGE["good"]), "="), SEPARATED: (tint(PAGE["wrong"]), "|"), UNDECIDED: (PAGE["line"], "?")}
+CURVE, CUSP, NODE = "black", SERIES[1], SERIES[2]
+STAR = {"color": MEANINGS["goal"][1], "markeredgecolor": "black"}
+"""The goal."""
+SHADES = ("white", *(tint(SERIES[0], share) for share in (0.1, 0.22, 0.4)))
+"""No mode, two, four, six."""
+LEAST_PANEL = 3.0
+"""The least width (inches) of one of several drawings."""
+COUNTED, PLACES = 161, 480
+"""Directions a side for which modes are counted, and places of the first corner that are looked at for it."""
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnSection:
+    """What is drawn of a section: the curve and the modes' places, or why there is none."""
+
+    found: tuple[SingularitySlice, dict[int, CrankPlace]] | None
+    reason: str | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """The section, or why there is none."""
+        return {"reason": self.reason} if self.found is None else self.found[0].to_dict()
+
+
+def section(found: AspectTable, seed: int) -> DrawnSection:
+    """The section with the first watched leg held."""
+    made = found.section
+    return DrawnSection(None, made) if isinstance(made, str) else DrawnSection(made, None)
+
+
+def undrawn(found: AspectTable) -> str | None:
+    """Why there is no table."""
+    return why_undrawn(found.listed)
+
+
+@in_style
+def picture(found: AspectTable, drawn: DrawnSection, paper: Paper = PNG) -> bytes:
+    """The picture (PNG); raises ``BadRequest`` where there are no modes."""
+    why = why_undrawn(found.listed)
+    if why is not None:
+        raise BadRequest(f"{found.listed.setup.robot.name}: there is nothing to draw: {why}", None, "isolated modes")
+    count = 1 if drawn.found is None else 3
+    columns = paper.columns(count, LEAST_PANEL)
+    rows = -(-count // columns)
+    figure, axes = panels(
+        rows, columns, 5.4 * columns, 5.4 * rows + 1.2, paper, (0.6 * columns, 0.6 * rows + 1.2), LEAST_PANEL
+    )
+    for place in axes[count:]:
+        place.set_visible(False)
+    _table(axes[0], found)
+    entries = [
+        entry(verdict, linestyle="", marker="s", markersize=10, color=colour, markeredgecolor="0.5")
+        for verdict, (colour, _) in CELLS.items()
+        if any(verdict in row for row in found.table)
+    ]
+    if drawn.found is not None:
+        entries += _curves(axes[1:3], found, *drawn.found)
+    plots.legend(figure, entries, paper)
+    seen = ", ".join(found.listed.setup.labels)
+    told = ", cuspidal" if found.cuspidal else ""
+    figure.suptitle(
+        f"{found.listed.setup.robot.name}, legs {seen} watched\n{found.listed.count}, "
+        f"aspects: {found.aspects_met}{told}"
+    )
+    return print_figure(figure, paper)
+
+
+def _colour(found: AspectTable, number: int) -> str:
+    """One colour for all modes of an aspect."""
+    groups = [k for k, group in enumerate(found.groups) if number in group]
+    return SERIES[groups[0] % len(SERIES)] if groups else "0.6"
+
+
+def _table(place: Any, found: AspectTable) -> None:
+    size = len(found.table)
+    for i, row in enumerate(found.table):
+        for j, verdict in enumerate(row):
+            colour, sign = CELLS[verdict]
+            place.fill([j, j + 1, j + 1, j], [i, i, i + 1, i + 1], facecolor=colour, edgecolor="white", linewidth=1.5)
+            if size <= 20:
+                place.text(j + 0.5, i + 0.5, sign, ha="center", va="center", color="0.35")
+    for axis, name in ((place.xaxis, "x"), (place.yaxis, "y")):
+        axis.set_ticks(np.arange(size) + 0.5, [str(k + 1) for k in range(size)])
+        for k, label in enumerate(axis.get_ticklabels()):
+            label.set(color=_colour(found, k + 1), fontweight="bold")
+        place.tick_params(axis=name, length=0)
+    place.set(xlim=(0, size), ylim=(size, 0), aspect="equal", title="mode × mode")
+    place.set_frame_on(False)
+
+
+def _curves(axes: Any, found: AspectTable, drawn: SingularitySlice, modes: dict[int, CrankPlace]) -> list[Any]:
+    """Both views of the section, all angles counted from the goal's; the entries of the legend."""
+    from matplotlib.colors import BoundaryNorm, ListedColormap
+    from matplotlib.patches import Patch
+    from matplotlib.ticker import MultipleLocator
+
+    goal = next(iter(modes.values()))
+    first, second = np.angle(goal.rods[1:])
+    crank = float(np.angle(goal.cranks[0]))
+    labels = drawn.robot.labels
+    there, here = axes
+    ticks = np.linspace(-np.pi, np.pi, COUNTED)
+    counts = mode_counts(drawn.robot, drawn.held, ticks + first, ticks + second, PLACES)
+    there.pcolormesh(
+        cell_edges(np.degrees(ticks)),
+        cell_edges(np.degrees(ticks)),
+        counts.T,
+        cmap=ListedColormap(SHADES),
+        norm=BoundaryNorm([-1, 1, 3, 5, 7], 4),
+        rasterized=True,
+    )
+    for piece in drawn.curve:
+        _line(there, piece[:, 2] - first, piece[:, 3] - second)
+        _line(here, piece[:, 0] - crank, piece[:, 1])
+    for points, colour, mark in ((drawn.cusps, CUSP, "o"), ([a for a, _ in drawn.nodes], NODE, "s")):
+        for point in points:
+            style = {
+                "marker": mark,
+                "color": colour,
+                "markersize": 5,
+                "markerfacecolor": colour if point.radius is not None else "white",
+            }
+            one, other = point.directions
+            there.plot(*_degrees(one - first, other - second), zorder=4, **style)
+            if mark == "o":
+                here.plot(*_degrees(point.crank - crank, point.turn), zorder=4, **style)
+    there.plot(0, 0, "*", **STAR, markersize=15, zorder=5)
+    for number, at in modes.items():
+        x, y = _degrees(float(np.angle(at.cranks[0])) - crank, at.turn)
+        here.plot(
+            x, y, "o", color=_colour(found, number), markeredgecolor="black", markersize=13, zorder=5, clip_on=False
+        )
+        here.text(x, y, str(number), ha="center", va="center", color="white", fontsize=9, fontweight="bold", zorder=6)
+    there.set(
+        xlabel=f"direction of leg {labels[1]} (degrees from the goal's)",
+        ylabel=f"direction of leg {labels[2]} (degrees from the goal's)",
+        title=f"directions, leg {labels[0]} held",
+    )
+    here.set(
+        xlabel=f"crank {labels[0]} (degrees from the goal's)",
+        ylabel="φ (degrees from the goal's)",
+        title=f"poses, leg {labels[0]} held",
+    )
+    for place, used in ((there, counts > 0), (here, np.ones((COUNTED, COUNTED), dtype=bool))):
+        shown = [np.degrees(ticks[np.flatnonzero(used.any(axis=axis))[[0, -1]]]) for axis in (1, 0)]
+        place.set(xlim=shown[0], ylim=shown[1], box_aspect=1)
+        place.xaxis.set_major_locator(MultipleLocator(30 if np.ptp(shown[0]) < 240 else 60))
+        place.yaxis.set_major_locator(MultipleLocator(30 if np.ptp(shown[1]) < 240 else 60))
+    kinds = [
+        entry("Type 2 singularities", color=CURVE, linewidth=1.2),
+        entry("the goal's directions", linestyle="", marker="*", markersize=11, **STAR),
+    ]
+    nodes = [place for place, _ in drawn.nodes]
+    for points, colour, mark, name in ((drawn.cusps, CUSP, "o", "cusp"), (nodes, NODE, "s", "node")):
+        for proved, words in ((True, f"{name}, enclosed"), (False, f"{name}, found")):
+            if any((point.radius is not None) == proved for point in points):
+                kinds.append(
+                    entry(words, linestyle="", marker=mark, color=colour, markerfacecolor=colour if proved else "white")
+                )
+    return [
+        *kinds,
+        *(
+            Patch(facecolor=shade, edgecolor="0.6", label=f"{number} modes")
+            for shade, number in zip(SHADES, (0, 2, 4, 6), strict=True)
+            if np.any(counts == number)
+        ),
+    ]
+
+
+def _degrees(*angles: float) -> tuple[float, ...]:
+    """Angles (rad) as degrees from −180 to 180."""
+    return tuple(float(np.degrees((angle + np.pi) % (2 * np.pi) - np.pi)) for angle in angles)
+
+
+def _line(place: Any, x: Array, y: Array) -> None:
+    """A line of angles (rad), broken where it passes ±180 degrees."""
+    flat = np.degrees((np.column_stack([x, y]) + np.pi) % (2 * np.pi) - np.pi)
+    flat[1:][np.max(np.abs(np.diff(flat, axis=0)), axis=1) > 180] = np.nan
+    place.plot(*flat.T, color=CURVE, linewidth=1.2, zorder=3)

@@ -1,0 +1,110 @@
+"""All endings of a loop → a picture: the robot at the goal, and the platform at every pose that attracts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..kinematics.configuration import ClosedConfiguration
+from ..simulation.equilibria.equilibrium import CRITICAL, STABLE, Equilibria, Equilibrium
+from . import palette
+from .figure_format import PNG, Paper, legend_within, print_figure, settle_title
+from .palette import SERIES
+from .plots import empty_figure, entry, in_style, pose_words
+from .skeleton import legs_of, outline
+from .sketch import Sketch
+from .view.view import plane_normal
+
+WIDE, TALL, EDGE, SCALES = 7.2, 6.4, 0.2, 0.8
+"""Width and height of the picture, its margin, and the room for the scales (inches)."""
+WITHIN = 1.6
+"""How far from the middle of the robot a rest may be to be drawn, as a multiple of the robot's size."""
+LOOKS: dict[str, dict[str, Any]] = {
+    "goal": {"color": palette.colour("goal"), "marker": "*", "markersize": 13},
+    "mode": {"color": palette.colour("mode"), "marker": "D", "markersize": 8},
+    "antipodal": {"color": SERIES[3], "marker": "s", "markersize": 8},
+    "critical": {"color": SERIES[1], "marker": "o", "markersize": 8},
+    "other": {"color": "0.6", "marker": "x", "markersize": 5},
+}
+BASE: dict[str, Any] = {"color": "black", "marker": "s", "markersize": 4}
+WORDS = {
+    "goal": "the goal",
+    "mode": "another mode",
+    "antipodal": "antipodal pose",
+    "critical": "pose with an error that attracts",
+    "other": "rest that does not attract",
+}
+
+
+@in_style
+def picture(found: Equilibria, paper: Paper = PNG) -> bytes:
+    """The endings as a figure on ``paper``."""
+    goal, platform = found.goal, found.setup.decomposition.platform
+    mechanism, motion = goal.model.mechanism, found.setup.motion
+    ground = np.array([joint.point for joint in mechanism.joints_of(mechanism.base)])
+    robot = [*legs_of(goal, platform), *_outlines(goal, platform), *_sights(found, goal)]
+    extent = np.vstack([ground, *robot])
+    middle, size = (extent.min(axis=0) + extent.max(axis=0)) / 2, float(np.ptp(extent, axis=0).max())
+    drawn = [(each, motion.position(each.configuration.pose(motion.link))) for each in found.points]
+    near = [(each, p) for each, p in drawn if np.abs(p - middle).max() <= WITHIN * size]
+    shapes = [
+        (look(each), [*_outlines(each.configuration, platform), *_sights(found, each.configuration)])
+        for each, _ in near
+        if each.stability == STABLE
+    ]
+    every = np.vstack([extent, *(p for _, p in near), *(stroke for _, some in shapes for stroke in some)])
+    figure = empty_figure(paper.wide(WIDE), TALL)
+    far = len(drawn) - len(near)
+    beyond = f"; {far} more farther away" if far else ""
+    word = "legs " if all(each.by_segment for each in found.setup.observed) else ""
+    title = figure.suptitle(
+        f"{found.setup.robot.name}, {word}{', '.join(found.setup.labels)} observed, goal "
+        f"{pose_words(found.pose)}\n{len(found.stable)} of {len(found.points)} rests attract"
+        f"{beyond}",
+        va="top",
+    )
+    above = settle_title(figure, title)
+    kinds = [kind for kind in WORDS if any(look(each) == kind for each, _ in near)]
+    entries = [
+        entry("robot at the goal", color="0.72"),
+        entry("joints of the base", linestyle="", **BASE),
+        *(entry(WORDS[k], linestyle="", **LOOKS[k]) for k in kinds),
+    ]
+    if shapes:
+        entries.append(entry("platform where it attracts (in its colour)", color="black", linewidth=1.6))
+    low = legend_within(figure, entries, figure.get_figwidth(), loc="lower center")
+    wide, tall = figure.get_figwidth(), figure.get_figheight()
+    box = (SCALES / wide, (low + SCALES) / tall, 1 - (SCALES + EDGE) / wide, 1 - (low + SCALES + above + EDGE) / tall)
+    sketch = Sketch.of(plane_normal(motion), ground, [])
+    place = sketch.place(figure, box, every)
+    for stroke in robot:
+        sketch.stroke(place, stroke, color="0.72", linewidth=1.2)
+    for kind, some in shapes:
+        for stroke in some:
+            sketch.stroke(place, stroke, color=LOOKS[kind]["color"], linewidth=1.6, zorder=5)
+    for kind in reversed(kinds):
+        points = np.array([p for each, p in near if look(each) == kind])
+        sketch.stroke(place, points, linestyle="", zorder=8 if kind != "other" else 4, **LOOKS[kind])
+    sketch.stroke(place, ground, linestyle="", zorder=6, **BASE)
+    return print_figure(figure, paper)
+
+
+def look(each: Equilibrium) -> str:
+    """As which kind a rest is drawn."""
+    return each.kind if each.kind != CRITICAL or each.stability == STABLE else "other"
+
+
+def _outlines(at: ClosedConfiguration, platform: Any) -> list[Any]:
+    return [outline(at.model.mechanism, link, at.pose(link)) for link in platform]
+
+
+def _sights(found: Equilibria, at: ClosedConfiguration) -> list[Any]:
+    """What is observed that is no segment, as lines in space."""
+    reference, size = found.setup.mechanism.reference, at.model.length / 2
+    return [
+        line
+        for each in found.setup.observed
+        if not each.by_segment
+        for line in each.draw(at.pose(each.seen_from or reference), at.pose(each.link), size).lines
+    ]

@@ -1,0 +1,50 @@
+"""The studio's questions and answers, as plain data: no server, no state, each question says all that it needs."""
+
+from __future__ import annotations
+
+import pkgutil
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from ...errors import BadRequest
+from ...results import Value
+from . import asks
+from .request import Request
+
+Answerer = Callable[[Request], dict[str, Any]]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AnalysisService(Value):
+    """What answers: the ``folder`` that was opened, where a tab's ``uploads`` lie, and the robot of the command line
+    (``given``: its name or path as ``robot``, its ``options``); None where there is none."""
+
+    folder: Path | None = None
+    uploads: Path | None = None
+    given: Mapping[str, Any] | None = None
+
+    def answer(self, asked: Any) -> dict[str, Any]:
+        """The answer to one question, plain data; raises ``BadRequest`` for what is none, and what answering raises."""
+        if not isinstance(asked, dict):
+            raise BadRequest("a question", asked, "an object with a field `ask`")
+        name = asked.get("ask")
+        if not isinstance(name, str) or name not in names():
+            raise BadRequest("no such question", name, names())
+        return answerer(name)(Request(asked, self.folder, self.uploads, self.given))
+
+
+@cache
+def names() -> tuple[str, ...]:
+    """The questions that there are: the modules of ``asks``."""
+    return tuple(sorted(module.name for module in pkgutil.iter_modules(asks.__path__)))
+
+
+@cache
+def answerer(name: str) -> Answerer:
+    """What answers a question."""
+    found: Answerer = import_module(f"{asks.__name__}.{name}").answer
+    return found

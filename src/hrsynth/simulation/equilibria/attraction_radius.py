@@ -1,0 +1,238 @@
+"""The certified radius: from how far around a goal every start is proved to end there (docs/pages/endings.md).
+
+In cones about the goal the error E = ½‖e‖² is proved to rise along every ray until it is at least c. Then no run, along
+which E falls, leaves the component of {E < c} that holds the goal; the goal is its only critical point; and all starts
+within r lie in it, if E is enclosed below c there. That holds for the damped law as for the exact one. Of the exact
+one a larger ball is proved, into which it leads (:mod:`.inward`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...analysis.observed import ObservedRobot
+from ...batch.enclosures import BoxFormula, trace_formula
+from ...budgets import RADIUS_BOXES, RAYS
+from ...geometry.affine import AffineForms, affine, stack
+from ...geometry.so3 import angle_of
+from ...geometry.vectors import Array, transform
+from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.platform_motion import PlatformMotion
+from ...records import As, recorded
+from ...results import Value
+from ...tolerances import AFFINE_ROUNDING, CERTIFIED_LEVEL, FOLLOWED, RADIUS_SHARES, RANK_CUTOFF, SAME_POINT
+from .cones import ConeProver, ProvedCones, prove_cones, proved_all_over
+from .inward_flow import inward_radius
+from .pose_error import NotEnclosed, PoseError
+
+CERTIFIED, UNDECIDED = "certified", "undecided"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CertifiedRadius(Value):
+    """What is proved of the starts about a goal, in its working mode: from platform positions within ``length`` (m)
+    and, where it turns, turns within ``angle`` (rad) of the goal's (both at once) every run ends at the goal.
+
+    ``level`` is c, ``least`` a lower bound of ‖∇E‖ / |x|, x the pose from the goal's (characteristic lengths, halves of
+    tangents of half the turn); ``boxes`` were tried. Where nothing is certified ``reason`` says why; ``limits`` are
+    joints whose limits are not looked at."""
+
+    goal: ClosedConfiguration
+    motion: PlatformMotion
+    length: Annotated[float, As("radius_m")]
+    angle: Annotated[float | None, As("radius_rad")]
+    level: float
+    least: float
+    boxes: int
+    reason: str
+    undamped: float = 0.0
+    """The same of the law where it is not damped (characteristic lengths, radians)."""
+    aside: bool = False
+    """Whether positions are those of another point of the platform than the one that its poses tell."""
+
+    @property
+    def verdict(self) -> str:
+        """Certified, or undecided."""
+        return CERTIFIED if self.length > 0 else UNDECIDED
+
+    @property
+    @recorded()
+    def words(self) -> str:
+        """From where every start ends at the goal."""
+        if not self.length:
+            return f"undecided: {self.reason}"
+        return f"from anywhere {self._within(self.length, self.angle)}"
+
+    @property
+    @recorded(As("undamped"))
+    def undamped_words(self) -> str | None:
+        """From where, as long as the law is not damped; None where that is not farther."""
+        length = self.goal.model.length * self.undamped
+        if length <= self.length:
+            return None
+        within = self._within(length, None if self.angle is None else self.undamped)
+        return f"proved where the law is not damped: {within}"
+
+    @property
+    def measured(self) -> str:
+        """Which point's positions count, where poses tell another's; else empty."""
+        point = " ".join(f"{x:.4g}" for x in self.motion.point)
+        return f"measured at the point ({point}) m of {self.motion.link}" if self.aside else ""
+
+    def _within(self, length: float, angle: float | None) -> str:
+        turn = "" if angle is None else f" and {np.degrees(angle):.2g}°"
+        at = f", {self.measured}" if self.measured else ""
+        return f"within {1e3 * length:.3g} mm{turn} of the goal in its working mode{at}"
+
+    def holds(self, X: Array) -> bool:
+        """Whether a platform pose X (4, 4) is one of those starts."""
+        here = self.goal.pose(self.motion.link)
+        shift = transform(X, self.motion.point) - transform(here, self.motion.point)
+        return bool(
+            np.linalg.norm(shift) <= self.length
+            and (self.angle is None or angle_of(X[:3, :3] @ here[:3, :3].T) <= self.angle)
+        )
+
+
+def certified_radius(setup: ObservedRobot, goal: ClosedConfiguration) -> CertifiedRadius:
+    """The largest radius that is proved with the budget of boxes, for directions of segments that are watched."""
+    try:
+        if not all(each.by_segment for each in setup.observed):
+            raise NotEnclosed("it is for directions of segments only")
+        error = PoseError.of(setup, goal)
+        if error.fitted:
+            raise NotEnclosed(f"forms are fitted to samples: {', '.join(error.fitted)}")
+        if error.limits:
+            raise NotEnclosed(f"a run may stop at the limits of joints: {', '.join(error.limits)}")
+        proved = _proved_cones(error)
+    except NotEnclosed as why:
+        return CertifiedRadius(goal, setup.motion, 0.0, None, 0.0, 0.0, 0, str(why))
+    reach, boxes = _reach(proved)
+    angle = reach if error.turns.shape[1] else None
+    # |x| ≤ t |W| √n on the faces of the cube
+    least = proved.rise / (error.size * float(np.linalg.norm(proved.prover.W, 2)) ** 2)
+    reason = "forms of the legs and the error enclosed in cones about the goal"
+    ball, more = inward_radius(error)
+    aside = bool(np.linalg.norm(error.motion.point - setup.motion.point) > SAME_POINT * error.length)
+    return CertifiedRadius(
+        goal,
+        error.motion,
+        reach * error.length,
+        angle,
+        proved.level,
+        least,
+        proved.boxes + boxes + more,
+        reason,
+        _product(ball) if error.turns.shape[1] else ball,
+        aside,
+    )
+
+
+def _product(radius: float) -> float:
+    """The largest r with r² + tan²(r / 2) ≤ ρ²: shifts and turns of at most r are in the ball."""
+    low, high = 0.0, radius
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if middle**2 + np.tan(middle / 2) ** 2 <= radius**2 else (low, middle)
+    return float(low)
+
+
+def _proved_cones(error: PoseError) -> ProvedCones:
+    """Cones proved up to nearly where E is seen to stop rising on some ray; raises ``NotEnclosed``."""
+    n = error.size
+    _, rates = error.numbers(np.zeros((1, n)), np.eye(n))
+    J = rates[0]
+    values, V = np.linalg.eigh(J.T @ J)
+    if values[0] <= RANK_CUTOFF * values[-1]:
+        raise NotEnclosed("the directions do not see all freedoms at the goal")
+    W = V / np.sqrt(values)
+    seen = _highest(error, W)
+    prover = ConeProver.of(error, W * np.sqrt(2 * seen))
+    proved = prove_cones(prover, CERTIFIED_LEVEL * seen)
+    if not proved.level > 0:
+        raise NotEnclosed("no ball about the goal is small enough for the enclosures")
+    return proved
+
+
+def _highest(error: PoseError, W: Array) -> float:
+    """The least E at which a ray of many stops rising, or leaves the legs' reach: seen, not proved."""
+    n = error.size
+    w = np.random.default_rng(0).normal(size=(RAYS, n))
+    w /= np.linalg.norm(w, axis=1)[:, None]
+    rising, before, lowest = np.ones(RAYS, dtype=bool), np.zeros(RAYS), np.inf
+    for t in np.geomspace(1e-3, 3.0, 150):
+        if not rising.any():
+            break
+        reached, E = error.levels(t * w @ W.T)
+        lost = rising & ~(reached & (before < E))
+        lowest = min(lowest, float(np.min(before[lost], initial=np.inf)))
+        rising &= ~lost & (lowest > E)
+        before = E
+    return lowest if np.isfinite(lowest) else float(np.max(before))
+
+
+def _reach(proved: ProvedCones) -> tuple[float, int]:
+    """The radius (characteristic lengths, radians) within which E < c is enclosed, and the boxes for it: near the one
+    that rays show."""
+    error, W, c = proved.prover.error, proved.prover.W, proved.level
+    # rays evenly about the goal, and towards where E rises fast
+    w = np.random.default_rng(0).normal(size=(2 * RAYS, error.size))
+    x = np.concatenate([w[:RAYS], w[RAYS:] @ np.linalg.inv(W)])
+    x *= np.max(np.linalg.norm(W, axis=0)) / np.linalg.norm(x, axis=1)[:, None]
+    low, high = np.zeros(len(x)), np.full(len(x), 2.0)
+    for _ in range(40):
+        middle = (low + high) / 2
+        reached, E = error.levels(middle[:, None] * x)
+        inside = reached & (c > E)
+        low, high = np.where(inside, middle, low), np.where(inside, high, middle)
+    seen = float(np.min(_gauge(error, low[:, None] * x)))
+    errors = trace_formula(
+        lambda inputs, number: [x for each in error.at(inputs, [], number).seen for x in each.error], error.size
+    )
+    Q, boxes = proved.prover.Q @ np.linalg.inv(W), 0
+    for share in RADIUS_SHARES:
+        held, used = _below(error, errors, Q, share * seen, c)
+        boxes += used
+        if held:
+            return share * seen, boxes
+    return 0.0, boxes
+
+
+def _gauge(error: PoseError, x: Array) -> Array:
+    """The larger of shift and turn (characteristic lengths, radians) at coordinates (n, size)."""
+    k = error.shifts.shape[1]
+    shift, turn = np.linalg.norm(x[:, :k], axis=1), 2 * np.arctan(np.linalg.norm(x[:, k:], axis=1))
+    return np.asarray(np.maximum(shift, turn))
+
+
+def _highest_on(errors: BoxFormula, Q: Array, middle: Array, half: Array) -> AffineForms:
+    """E over boxes (c, n) of coordinates x: with e = Q x + a it is ½ (xᵀ Qᵀ Q x + 2 Q x · a + |a|²)."""
+    n, H = middle.shape[1], Q.T @ Q
+    off = half[:, :, None] * np.eye(n)
+    e = stack(errors.at([affine(middle[:, i], off[:, i], np.zeros(len(middle))) for i in range(n)]))
+    extent = np.abs(middle) + half
+    Qx = affine(middle @ Q.T, np.einsum("cks,rk->crs", off, Q), AFFINE_ROUNDING * extent @ np.abs(Q).T)
+    a = e - Qx
+    # xᵀ H x at the middle m: mᵀ H m + 2 (H m) · δ + δᵀ H δ
+    Hm = middle @ H
+    bent = np.einsum("ci,ij,cj->c", half, np.abs(H), half) + FOLLOWED * np.sum(extent @ np.abs(H) * extent, axis=1)
+    square = affine(np.sum(Hm * middle, axis=1), 2 * Hm * half, bent)
+    return 0.5 * (square + (2.0 * (Qx * a) + a * a).sum())
+
+
+def _below(error: PoseError, errors: BoxFormula, Q: Array, radius: float, c: float) -> tuple[bool, int]:
+    """Whether E < c is enclosed at all poses within a radius, by boxes that are cut where it is not; their number."""
+    k, n = error.shifts.shape[1], error.size
+    whole = np.where(np.arange(n) < k, radius, np.tan(min(radius, 3.0) / 2)) * (1 + FOLLOWED)
+
+    def inside(middle: Array, half: Array) -> NDArray[np.bool_]:
+        return np.asarray(_gauge(error, np.maximum(np.abs(middle) - half, 0.0)) <= radius)
+
+    def judge(middle: Array, half: Array) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+        return _highest_on(errors, Q, middle, half).high < c, np.argmax(half / whole, axis=1)
+
+    return proved_all_over(whole, inside, judge, RADIUS_BOXES)

@@ -1,0 +1,479 @@
+"""Where runs to one goal end, from each start of a line, plane or box of poses: many abreast where the batch knows the
+robot, else one by one."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from itertools import chain
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+
+from ...analysis.accuracy.error_map import Mapper
+from ...analysis.accuracy.measurement_bounds import MeasurementBounds
+from ...analysis.analysis_declaration import analysis
+from ...analysis.observed import CameraLike, Jobs, LegsLike, ObservedRobot, RobotLike, Seed, SeeLike
+from ...analysis.pose_requests import configurations_at
+from ...batch.grids import poses_over
+from ...batch.pose_continuation import sweep
+from ...budgets import (
+    FLOW_CHECKED,
+    FLOW_EXAMPLES,
+    FLOW_FEW,
+    FLOW_FOLLOWED,
+    FLOW_NAMED,
+    FLOW_PART,
+    FLOW_SINGLE,
+    FLOW_STARTS,
+    FLOW_STARTS_ONE_BY_ONE,
+    RUN_AWAY,
+)
+from ...errors import BadRequest, HrsynthError, NoReachablePose
+from ...geometry.so3 import turn_about
+from ...geometry.vectors import Array, pose_difference
+from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.platform_motion import PlatformMotion
+from ...mechanism.pose import Grid, Pose, PoseLike, as_pose, asked_pose
+from ...options import option
+from ...processes import run_shared
+from ...progress import report
+from ...records import FLAT, As, Number, Recorded, Shown, Table, recorded
+from ...results import Result, Value
+from ...tolerances import RUNS_ALIKE, SEEN_ABOVE
+from ..law import Depth, measure_all
+from ..outcome import ENDINGS, GOAL, SIGHT, TIME, UNDECIDED, OutcomeClassifier, RunOutcome
+from ..run import AWAY, EFFORT, LOST, POISED, REST, SERVED_AT
+from ..run import TIME as OVER
+from ..servo import Conditions, ServoTask
+from .attraction_radius import CertifiedRadius, certified_radius
+from .batched_runs import BatchedRuns
+from .equilibrium import Equilibria
+from .flow import Flags, Flow, Places
+from .outcomes import Outcome, OutcomeCount, Outcomes
+
+SIDE, SIDE_ONE_BY_ONE = 100, 15
+"""Starts along each side of a plane, abreast and one by one."""
+REGION, REGION_SIDE = 1.1, (0, 401, 81, 25)
+"""Half the width over which what is certified is drawn, in its radii, and the poses along each side, by the number of
+parts that vary."""
+LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+"""Names of the ends in text and picture."""
+NOT_REACHED = -1
+"""The number of a start at which the robot cannot be."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BasinEnd(Value):
+    """Where runs end: the ``ending`` of one of them, simulated separately; the platform's pose X (4, 4) and ‖e‖ if they
+    come to rest at one pose; how many starts, and what share of all, end there; ``example`` is the pose of one of them,
+    as ``servo`` takes it."""
+
+    run_outcome: Annotated[RunOutcome, FLAT]
+    pose: Recorded[Pose | None]
+    X: Array | None
+    size: float
+    count: Annotated[int, As("starts")]
+    share: Recorded[float]
+    example: Recorded[Pose]
+
+    error = Shown(Number, lambda self: None if self.X is None else self.size, "‖e‖")
+
+
+class CertifiedPart(NamedTuple):
+    """The distance from the goal within which every start in its working mode is proved to end there, and what share of
+    the goal's basin among the starts that covers; the larger distance that holds as long as the law is not damped, if
+    there is one."""
+
+    radius: Annotated[CertifiedRadius, FLAT]
+    covered: float
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Basins(Result, shown_as="basins"):
+    """Where runs from each pose of a grid end: ``cells`` holds the number of the end, in the grid's shape, −1 where the
+    robot cannot start; ``damped`` the starts whose runs meet a singularity, where the law is damped. ``abreast`` says
+    whether they were integrated together; ``followed`` of them were then simulated one by one because that could not
+    continue, and of ``checked`` others ``agreed`` ended at the same pose."""
+
+    setup: Annotated[ObservedRobot, FLAT]
+    goal: Annotated[Pose, As("to")]
+    target: ClosedConfiguration
+    grid: Grid
+    ends: Recorded[tuple[BasinEnd, ...]]
+    cells: Annotated[Places, Table, "numbers of ``ends``, counted from 0, -1 where no run starts"]
+    damped: Flags
+    batched: Recorded[bool]
+    followed: Recorded[int] = 0
+    checked: Recorded[int] = 0
+    agreed: Recorded[int] = 0
+    certified: CertifiedRadius | None = None
+    """From how far around the goal every start is proved to end there."""
+
+    @property
+    @recorded()
+    def starts(self) -> int:
+        """At how many poses of the grid the robot can start."""
+        return int(np.sum(self.cells != NOT_REACHED))
+
+    @cached_property
+    def region(self) -> tuple[Grid, Flags] | None:
+        """Poses of the drawn set around the goal, and which of them are in what is certified; None where none is, or
+        where that is about another point than the one that the set is drawn of."""
+        found = self.certified
+        if found is None or not found.length or found.aside:
+            return None
+        motion, goal = self.setup.motion, self.target.pose(self.setup.motion.link)
+        half = [(found.angle or 0.0) if name == "phi" else found.length for name in self.grid.names]
+        middle = place_of(motion, goal, self.grid.names)
+        near = Grid(
+            tuple(
+                (name, np.linspace(m - REGION * h, m + REGION * h, REGION_SIDE[self.grid.ndim]))
+                for name, m, h in zip(self.grid.names, middle, half, strict=True)
+            ),
+            self.grid.fixed,
+        )
+        X, possible = poses_over(motion, near, self.setup.robot.name, near.places())
+        inside = np.array([met and found.holds(each) for met, each in zip(possible, X, strict=True)])
+        return (near, inside.reshape(near.shape)) if inside.any() else None
+
+    @property
+    def covered(self) -> float:
+        """How much of the goal's basin, as far as it is drawn, is certified."""
+        goal = next((i for i, each in enumerate(self.ends) if each.run_outcome.name == GOAL), None)
+        if self.region is None or goal is None:
+            return 0.0
+        sizes = [
+            np.sum(inside) * math.prod(float(v[1] - v[0]) for _, v in grid.axes)
+            for grid, inside in (self.region, (self.grid, self.cells == goal))
+        ]
+        return float(sizes[0] / sizes[1])
+
+    def members(self, listed: Equilibria) -> tuple[int | None, ...]:
+        """The place of each end in a list of rests with the same goal; None where it is not on the list, or no rest."""
+        length, link = self.target.model.length, self.setup.motion.link
+        rests = [(rest.configuration.pose(link), rest.error) for rest in listed.points]
+        return tuple(
+            next(
+                (
+                    i
+                    for i, (X, size) in enumerate(rests)
+                    if each.X is not None
+                    and abs(size - each.size) <= RUNS_ALIKE
+                    and pose_difference(X, each.X, length) <= RUNS_ALIKE
+                ),
+                None,
+            )
+            for each in self.ends
+        )
+
+    def headline(self) -> str:
+        """The robot and what share of the starts ends at the goal."""
+        share = next((each.share for each in self.ends if each.run_outcome.name == GOAL), 0.0)
+        return f"{self.setup.headline()}: {100 * share:.3g} % of {self.starts:,} starts end at the goal {self.goal}"
+
+    poses = Shown(str, lambda self: str(self.grid))
+    axes = Shown(dict[str, list[float]], lambda self: dict(self.grid.axes))
+    damped_record = Shown(int, lambda self: np.sum(self.damped), As("damped"))
+
+    @property
+    @recorded(As("certified"))
+    def certified_record(self) -> CertifiedPart | None:
+        """What is certified; None where nothing was sought."""
+        return None if self.certified is None else CertifiedPart(self.certified, self.covered)
+
+
+@analysis(
+    120,
+    examples=(
+        "quattro --observe 1,4 --to z=-0.7 --plane z=-0.7,phi=0 -o basins.png",
+        "3rrr_m1 --to x=0,y=0,phi=0 --grid x=-0.1:0.1:50,y=0,phi=0",
+    ),
+)
+def basins(
+    robot: RobotLike,
+    observe: LegsLike = None,
+    camera: CameraLike = None,
+    *,
+    see: SeeLike = None,
+    to: Annotated[PoseLike, option("Pose whose measurements are desired.", "POSE")],
+    plane: Annotated[
+        PoseLike | None,
+        option(
+            "Plane of starts, such as z=-0.7, as far as it is reached (default: one through the goal).", "PART=VALUE"
+        ),
+    ] = None,
+    grid: Annotated[
+        str | None,
+        option("A line, plane or box of starts, such as x=-0.3:0.3:50,y=-0.3:0.3:50,z=-0.7 (from:to:count).", "GRID"),
+    ] = None,
+    steps: Annotated[
+        int | None,
+        option(
+            "Starts along each side of the plane (default: 100; 15 if each is simulated separately).", low=2, high=300
+        ),
+    ] = None,
+    jobs: Jobs = None,
+    depth: Depth = "exact",
+    seed: Seed = 0,
+) -> Basins:
+    """Where the servo loop to a goal ends, from each start of a line, plane or box of poses.
+
+    Where the loop ends that servoes what is observed at the pose ``to``, from each start of a plane of poses (by
+    default one through the goal, as far as it is reached, ``steps`` poses a side) or of a ``grid``, a line, plane or
+    box such as ``x=-0.3:0.3:50,y=-0.3:0.3:50,z=-0.7``.
+
+    ``observe``, ``camera`` and ``see`` are as for ``derive``. The law is that of ``servo`` with exact measurements (and
+    a ``depth``). Robots whose legs have closed forms and are watched by their directions are integrated together,
+    others one by one. There are ``jobs`` processes, by default one per core; the answer does not depend on their
+    number.
+
+    Raises ``BadRequest`` for unknown names, legs that do not see the platform, a singular goal, too many starts;
+    ``PoseNotReached``, ``NoReachablePose`` for poses out of reach.
+
+    >>> hrsynth.basins("3rrr_m1", to="x=0,y=0,phi=0", grid="x=-0.02:0.02:5,y=-0.02:0.02:5,phi=0")
+    <Basins: 3rrr_m1, watching 1, 2, 3: 100 % of 25 starts end at the goal x=0,y=0,z=0,phi=0deg>
+    """
+    setup = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
+    asked = asked_pose(to)
+    setup = setup.telling([asked])
+    if plane is not None and grid is not None:
+        raise BadRequest("basins: both a plane and a grid are given", str(grid), "one of them")
+    (goal,) = configurations_at(setup, [asked])
+    task = ServoTask.between(setup, goal, goal, Conditions(depth=depth))
+    search = BasinSearch(setup, goal, task, jobs or os.cpu_count() or 1)
+    return search.over(search.plane(plane, steps) if grid is None else Grid.parse(grid, FLOW_STARTS), seed)
+
+
+@dataclass(frozen=True, eq=False)
+class BasinSearch:
+    """A goal and the loop that leads to it, of which many starts are followed, in so many processes (``jobs``)."""
+
+    setup: ObservedRobot
+    goal: ClosedConfiguration
+    task: ServoTask
+    jobs: int
+
+    @cached_property
+    def flow(self) -> Flow | None:
+        """The law abreast; None where something hinders it."""
+        setup = self.setup
+        if setup.placer is None or hindrances(setup):
+            return None
+        return Flow(setup.placer, tuple(setup.labels), self.task.directions)
+
+    def plane(self, plane: PoseLike | None, steps: int | None) -> Grid:
+        """The poses of a plane that are reached; by default one through the goal."""
+        motion, X = self.setup.motion, self.goal.pose(self.setup.motion.link)
+        if plane is not None:
+            fixed = as_pose(plane)
+        elif motion.planar:
+            fixed = Pose(phi=float(place_of(motion, X, ("phi",))[0]))
+        else:
+            fixed = Pose(z=float(motion.position(X)[2])) if motion.shifts == 3 else Pose()
+        return Mapper(self.setup, MeasurementBounds(np.zeros(0))).plane(
+            fixed, steps or (SIDE if self.flow else SIDE_ONE_BY_ONE)
+        )
+
+    def over(self, grid: Grid, seed: int) -> Basins:
+        """The ends of the runs from all poses of a grid."""
+        name, motion = self.setup.robot.name, self.setup.motion
+        most, count = FLOW_STARTS if self.flow else FLOW_STARTS_ONE_BY_ONE, math.prod(grid.shape)
+        if count > most:
+            how = "" if self.flow else ", which are simulated one by one"
+            raise BadRequest(f"{name}: number of starts{how}", count, f"at most {most:,}")
+        X, possible = poses_over(motion, grid, name, grid.places())
+        found = self._abreast(X, possible, seed) if self.flow else self._one_by_one(X, grid)
+        if not len(found.outcomes):
+            raise NoReachablePose(name, f"the grid {grid}", f"none of {count} is")
+        counts = np.bincount(found.cells[found.cells != NOT_REACHED], minlength=len(found.outcomes))
+        order = sorted(np.flatnonzero(counts), key=lambda i: (ENDINGS.index(found.outcomes[i].ending.name), -counts[i]))
+        ends, cells = [], np.full(count, NOT_REACHED)
+        for number, i in enumerate(order):
+            outcome, here = found.outcomes[i], np.flatnonzero(found.cells == i)
+            cells[here] = number
+            example = self._example(found.X[here])
+            ends.append(
+                BasinEnd(
+                    outcome.ending,
+                    None if outcome.X is None else motion.pose(outcome.X),
+                    outcome.X,
+                    outcome.size,
+                    len(here),
+                    len(here) / counts.sum(),
+                    example,
+                )
+            )
+        return Basins(
+            self.setup,
+            motion.pose(self.goal.pose(motion.link)),
+            self.goal,
+            grid,
+            tuple(ends),
+            cells.reshape(grid.shape),
+            found.damped.reshape(grid.shape),
+            self.flow is not None,
+            found.followed,
+            found.checked,
+            found.agreed,
+            found.certified,
+        )
+
+    def _example(self, X: Array) -> Pose:
+        """Of the starts X (n, 4, 4) that end alike the one nearest to their middle, if small steps lead there from the
+        zero configuration; else the nearest to which they do, of the first few."""
+        away = np.linalg.norm(X[:, :3, 3] - np.median(X[:, :3, 3], axis=0), axis=1)
+        near = [self.setup.motion.pose(each) for each in X[np.argsort(away, kind="stable")[:FLOW_EXAMPLES]]]
+        return next(filter(self._starts, near), near[0])
+
+    def _starts(self, pose: Pose) -> bool:
+        """Whether a single run can start at a pose as it is printed."""
+        try:
+            (at,) = configurations_at(self.setup, [Pose.parse(str(pose))])
+            ServoTask.between(self.setup, at, self.goal)
+        except HrsynthError:
+            return False
+        return True
+
+    def _abreast(self, X: Array, possible: Flags, seed: int) -> OutcomeCount:
+        """The outcomes of starts X (n, 4, 4) that the batch follows, all abreast."""
+        flow, length = self.flow, self.goal.model.length
+        assert flow is not None
+        starts = np.flatnonzero(possible & flow.batch.reaches(X))
+        cells, damped = np.full(len(X), NOT_REACHED), np.zeros(len(X), dtype=bool)
+        if not len(starts):
+            return OutcomeCount([], cells, damped, X)
+        horizon = self.task.conditions.horizon * self.task.law.gain
+        # each part from all over the grid, so that all take as long
+        count = -(-len(starts) // FLOW_PART)
+        shares = [starts[k::count] for k in range(count)]
+        starts = np.concatenate(shares)
+        # a step of few runs takes as long as one of a thousand: the last of all parts go on together
+        first, *others = self._run_all(
+            [
+                partial(_follow_flow, flow.bare(), horizon, RUN_AWAY * length, X[share], FLOW_FEW // count)
+                for share in shares
+            ]
+        )
+        checked = np.random.default_rng(seed).choice(len(starts), min(FLOW_CHECKED, len(starts)), replace=False)
+        runs, certified, *alone = self._run_all(
+            [
+                partial(first.together(others).run, horizon),
+                partial(certified_radius, self.setup, self.goal),
+                *self._single(self._start(X[starts[checked]])),
+            ]
+        )
+        damped[starts] = runs.weak
+        groups = runs.groups(length, flow.seen)
+        shown = groups[:FLOW_NAMED]
+        away, open_ = (np.flatnonzero(np.isin(runs.stopped, words)) for words in ((AWAY,), (LOST, EFFORT)))
+        followed = open_[np.unique(np.linspace(0, len(open_) - 1, FLOW_FOLLOWED).astype(int))] if len(open_) else open_
+        at = flow.configurations(runs.X[[group[0] for group in shown]], runs.flipped[[group[0] for group in shown]])
+        told = list(chain(*self._run_all(self._single(at + self._start(X[starts[[*away[:1], *followed]]])))))
+        numbers, outcomes = np.full(len(starts), -1), Outcomes(length)
+        for group, outcome in zip(shown, told, strict=False):
+            numbers[group] = outcomes.number(_at(outcome, runs.X[group[0]], length))
+        told = told[len(shown) :]
+        if len(away):
+            numbers[away] = outcomes.number(told[0])
+        numbers[runs.stopped == OVER] = outcomes.number(Outcome(RunOutcome(TIME, "the time ran out")))
+        same = [
+            outcome.alike(outcomes.all[numbers[run]], length)
+            for run, outcome in zip(checked, chain(*alone), strict=True)
+            if numbers[run] >= 0
+        ]
+        for run, outcome in zip(followed, told[min(len(away), 1) :], strict=True):
+            numbers[run] = outcomes.number(outcome)
+        numbers[numbers < 0] = outcomes.number(Outcome(RunOutcome(UNDECIDED, "not followed to an end")))
+        cells[starts] = numbers
+        return OutcomeCount(outcomes.all, cells, damped, X, len(followed), len(same), sum(same), certified)
+
+    def _one_by_one(self, X: Array, grid: Grid) -> OutcomeCount:
+        """The outcomes of the starts of a grid, each simulated; X (n, 4, 4) are its poses, free parts as at home."""
+        all_samples = self.setup.all_samples
+        at = sweep(all_samples.start, all_samples.observation_model, grid, self.setup.motion, self.setup.placer)
+        starts = np.array([i for i, each in enumerate(at) if each is not None], dtype=int)
+        cells, outcomes = np.full(len(at), NOT_REACHED), Outcomes(self.goal.model.length)
+        certified, *told = self._run_all(
+            [partial(certified_radius, self.setup, self.goal), *self._single([at[i] for i in starts])]
+        )
+        for i, outcome in zip(starts, chain(*told), strict=True):
+            cells[i] = outcomes.number(outcome)
+        reached = np.array(
+            [there if each is None else each.pose(self.setup.motion.link) for each, there in zip(at, X, strict=True)]
+        )
+        return OutcomeCount(
+            outcomes.all, cells, np.zeros(len(at), dtype=bool), reached, len(starts), certified=certified
+        )
+
+    def _start(self, X: Array) -> list[ClosedConfiguration | None]:
+        """The configurations at starts X (n, 4, 4)."""
+        assert self.flow is not None
+        return self.flow.configurations(X, np.zeros((len(X), len(self.flow.legs)), dtype=bool))
+
+    def _single(self, starts: Sequence[ClosedConfiguration | None]) -> list[Callable[[], list[Outcome]]]:
+        """Pieces of work that give the outcomes of single runs, undecided where there is no start."""
+        return [partial(_simulate, self.task, starts[k : k + FLOW_SINGLE]) for k in range(0, len(starts), FLOW_SINGLE)]
+
+    def _run_all(self, works: Sequence[Callable[[], Any]]) -> list[Any]:
+        """What pieces of work give, in their order."""
+        jobs, found = min(self.jobs, len(works)), []
+        for each in run_shared(works, jobs):
+            if jobs > 1:
+                report("run")
+            found.append(each)
+        return found
+
+
+def hindrances(setup: ObservedRobot) -> tuple[str, ...]:
+    """Why runs of a robot cannot be integrated abreast."""
+    own = set(map(id, setup.segments))
+    kinds = dict.fromkeys("" if each.by_segment else each.kind for each in setup.observed if id(each) not in own)
+    found = [
+        f"observations of kind {kind} are fed back" if kind else "other links are watched than by default"
+        for kind in kinds
+    ]
+    if setup.mechanism.stops:
+        found.append("a joint has limits")
+    return tuple(found) or (("a leg has no closed form",) if setup.placer is None else ())
+
+
+def place_of(motion: PlatformMotion, X: Array, names: Sequence[str]) -> Array:
+    """The values (m, rad) of parts of a platform pose X (4, 4)."""
+    turn = turn_about(motion.normal, X[:3, :3] @ motion.home[:3, :3].T)[0]
+    return np.array([turn if name == "phi" else motion.position(X)["xyz".index(name)] for name in names])
+
+
+def _at(outcome: Outcome, X: Array, length: float) -> Outcome:
+    """The outcome of runs abreast that end at X (4, 4), of which one was simulated on from there."""
+    if outcome.X is not None and pose_difference(outcome.X, X, length) <= RUNS_ALIKE:
+        return outcome
+    return Outcome(RunOutcome(UNDECIDED, "a single run does not stay where these end"))
+
+
+def _follow_flow(flow: Flow, horizon: float, farthest: float, X: Array, few: int) -> BatchedRuns:
+    found = BatchedRuns(flow, X, farthest).follow(horizon, few)
+    found.flow = flow.bare()
+    return found
+
+
+def _simulate(task: ServoTask, starts: Sequence[ClosedConfiguration | None]) -> list[Outcome]:
+    classifier = OutcomeClassifier(task.setup, task.goal, task.wanted)
+    loop, found = task.loop(), []
+    for start in starts:
+        if start is None:
+            found.append(Outcome(RunOutcome(UNDECIDED, "the robot was not found closed there")))
+            continue
+        if task.law.in_front(start) < SEEN_ABOVE:
+            found.append(Outcome(RunOutcome(SIGHT, "a camera does not see at the start what it is to see")))
+            continue
+        run = loop.simulate(start, task.conditions.horizon)
+        ending = classifier.classify(run, measure_all(run.last, task.law.observation_model)[0])
+        rests = run.stopped in (SERVED_AT, REST, POISED)
+        found.append(
+            Outcome(ending, run.last.pose(task.setup.motion.link), run.commands[-1].size) if rests else Outcome(ending)
+        )
+    return found

@@ -1,0 +1,485 @@
+"""The error over the platform's pose and the places of the legs' joints, closed by equations: smooth at all limits of
+legs.
+
+Coordinates y: shifts of the platform's point, the angle of its turn, and of each leg the angle of its crank or of its
+rod that slides, or the way of its slider. Equations g: the length of a rod, or that a rod that slides points to its
+tip. At a leg's limit g does not change with the leg's own joint; nothing is singular there but the pose as coordinates.
+
+Where all rods slide, poses may be anywhere. A chart of those ``far`` away has P / w in the place of the point, one
+component of P being 1: with all lengths times w the equations are smooth at w = 0, and so are rates
+along (1 / w) ∂/∂ψ, which are taken there. Of a platform that translates in space on rods that slide, a chart about a
+``short`` one has its length d and its direction u in the place of the point, A + d u, A where its length vanishes:
+u = v / |v| with one component of v being 1. E is smooth at d = 0, where the point does not tell u.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from ...batch.enclosures import BoxFormula, trace_formula
+from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, SlidingRod
+from ...geometry.components import (
+    Components,
+    combination,
+    cosine,
+    cross,
+    dot,
+    minus,
+    plus,
+    scale,
+    sine,
+    sqrt,
+    transform_vector,
+)
+from ...geometry.duals import Dual
+from ...geometry.so3 import exponential
+from ...geometry.vectors import Array, hat
+from ...results import Value
+from ...tolerances import EXACT, FOLLOWED, KNOWN_NUMBER, SHORTEST_ROD
+from .pose_error import Number, PoseError
+
+of_robot = partial(trace_formula, off=KNOWN_NUMBER)
+
+
+def rodless(error: PoseError) -> Array:
+    """Where the platform's point is as each rod that slides in space has no length, (limbs, 3)."""
+    return np.array([limb.centre - limb.tip.constant - error.R @ limb.tip.turned for limb in error.limbs])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class JointError(Value):
+    """The error to a goal in these coordinates; ``joints`` are the limbs with a joint among them, the others are closed
+    forms of the pose; ``far``: which of the shifts is w in a chart of poses far away; ``short``: which limb is so in a
+    chart about it, and which component of v is 1. Other rods without a joint are to be ``shortest`` long at least;
+    the desired directions are those at the ``goal`` (its pose and limbs), from which ``error`` may be turned. Where
+    only poses are asked for at which the error vanishes, that of the ``square`` watched direction may be at right
+    angles to the desired one instead."""
+
+    error: PoseError
+    joints: tuple[int, ...]
+    goal: PoseError
+    far: int | None = None
+    short: tuple[int, int] | None = None
+    shortest: float = SHORTEST_ROD
+    square: int | None = None
+
+    @classmethod
+    def of(cls, error: PoseError, goal: PoseError | None = None, shortest: float = SHORTEST_ROD) -> JointError:
+        """That about the goal; a rod that slides in a plane turns about the plane's normal."""
+        limbs = tuple(_in_plane(error, limb) for limb in error.limbs)
+        joints = tuple(
+            i
+            for i, limb in enumerate(limbs)
+            if isinstance(limb, OnCrank | OnRail) or (isinstance(limb, SlidingRod) and limb.axis is not None)
+        )
+        return cls(replace(error, limbs=limbs), joints, goal or error, shortest=shortest)
+
+    @property
+    def charts(self) -> tuple[JointError, ...]:
+        """Those that together hold all poses: this one, and where all rods slide those of poses far away and about
+        short rods; this one alone where that is not so."""
+        if not all(isinstance(each, SlidingRod) for each in self.error.limbs) or any(
+            each.limb is None and (each.rule is None or np.any(each.rule.turned)) for each in self.error.seen
+        ):
+            return (self,)
+        about = product(range(len(self.ends)), range(3))
+        return (
+            self,
+            *(replace(self, far=k) for k in range(self.error.shifts.shape[1])),
+            *(replace(self, short=each) for each in about),
+        )
+
+    @property
+    def endless(self) -> bool:
+        """Whether these hold all poses however far away."""
+        return len(self.charts) > 1
+
+    def list_charts(self, bounded: bool) -> tuple[JointError, ...]:
+        """Those that are to be looked at, of poses that are ``bounded`` by the legs' reach or not."""
+        return (self,) if bounded else self.charts
+
+    @property
+    def ends(self) -> Array:
+        """Where the platform's point is, from that of the goal, when rods that slide and turn as they like in space
+        have no length, (limbs, 3); none where length and direction of one do not tell where the platform is."""
+        error = self.error
+        if (
+            error.shifts.shape[1] != 3
+            or self.size[0] != 3
+            or not all(isinstance(each, SlidingRod) for each in error.limbs)
+        ):
+            return np.zeros((0, 3))
+        return rodless(error) - error.p
+
+    @property
+    def idle(self) -> list[ClosedFormLeg]:
+        """The limbs that are not watched."""
+        watched = {each.limb for each in self.error.seen}
+        return [each for i, each in enumerate(self.error.limbs) if i not in watched]
+
+    @property
+    def freedoms(self) -> int:
+        """Coordinates of the pose."""
+        return self.error.size
+
+    @property
+    def turning(self) -> tuple[int, ...]:
+        """Those of them that turn the platform; and which equations, after all coordinates, ask of these alone."""
+        return tuple(range(self.error.shifts.shape[1], self.freedoms))
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Coordinates and equations."""
+        return self.freedoms + len(self.joints), len(self.joints)
+
+    @property
+    def periods(self) -> Array:
+        """How far apart coordinates (n,) mean the same: a rod through a point may point either way, E is the same."""
+        found = [*(np.inf for _ in self.error.shifts.T), *(2 * np.pi for _ in self.error.turns.T)]
+        for i in self.joints:
+            limb = self.error.limbs[i]
+            found.append(
+                np.inf
+                if isinstance(limb, OnRail)
+                else np.pi
+                if isinstance(limb, SlidingRod) and limb.aside == 0
+                else 2 * np.pi
+            )
+        return np.array(found)
+
+    def box(self, low: Array, high: Array, reach: float) -> tuple[Array, Array]:
+        """The lower and the upper corner of all coordinates, for shifts between two corners, or beyond ``reach``."""
+        error, k, most = self.error, self.error.shifts.shape[1], self.periods / 2
+        if self.short is not None:
+            high = np.array([self.shortest, 1.0, 1.0])
+            return -high, high
+        if self.far is not None:
+            low, high = (sign * np.where(np.arange(k) == self.far, 1 / reach, 1.0) for sign in (-1.0, 1.0))
+        low, high = np.concatenate([low[:k], -most[k:]]), np.concatenate([high[:k], most[k:]])
+        for place, i in enumerate(self.joints, error.size):
+            limb = error.limbs[i]
+            if isinstance(limb, OnRail):
+                ways = limb.axis @ error.shifts
+                middle = limb.axis @ (error.p + limb.tip.constant - limb.centre) + ways @ (low[:k] + high[:k]) / 2
+                room = limb.rod + np.linalg.norm(limb.tip.turned) + np.abs(ways) @ (high[:k] - low[:k]) / 2
+                low[place], high[place] = middle - room - FOLLOWED, middle + room + FOLLOWED
+        return low, high
+
+    def near(self, y: Array) -> Array:
+        """Coordinates (…, n) of a chart in the one about the goal, no numbers where w vanishes."""
+        y = y.copy()
+        if self.short is not None:
+            v = np.insert(y[..., 1:], self.short[1], 1.0, axis=-1)
+            u = v / np.linalg.norm(v, axis=-1, keepdims=True)
+            return np.asarray((self.ends[self.short[0]] + y[..., :1] * u) @ self.error.shifts)
+        if self.far is not None:
+            w, k = y[..., self.far].copy(), self.error.shifts.shape[1]
+            y[..., self.far] = 1.0
+            with np.errstate(all="ignore"):
+                y[..., :k] /= w[..., None]
+        return y
+
+    def enclose_chart(self, middle: Array, half: Array) -> tuple[Array, Array]:
+        """What boxes (c, n) hold in the chart about the goal, boundless where w may vanish."""
+        if self.short is not None:
+            # |∂u/∂v| ≤ 1
+            at, off = self.near(middle), half[:, :1] + (np.abs(middle) + half)[:, :1] * half[:, 1:].sum(1)[:, None]
+            return at - off, at + off
+        if self.far is None:
+            return middle - half, middle + half
+        ends = np.stack([self.near(middle + half * signs) for signs in product((-1.0, 1.0), repeat=middle.shape[1])])
+        low, high = ends.min(axis=0), ends.max(axis=0)
+        k, endless = self.error.shifts.shape[1], np.abs(middle[:, self.far]) <= half[:, self.far]
+        low[endless, :k], high[endless, :k] = -np.inf, np.inf
+        return low, high
+
+    def pose(self, y: Array) -> tuple[Array, Array]:
+        """The platform's point (c, 3), in characteristic lengths, and rotation (c, 3, 3) at coordinates (c, n)."""
+        y, k = self.near(y), self.error.shifts.shape[1]
+        turn = exponential(y[:, k : self.error.size] @ self.error.turns.T)
+        return self.error.p + y[:, :k] @ self.error.shifts.T, turn @ self.error.R
+
+    def unknowns(self, y: Sequence[Any], places: Iterable[int]) -> list[Dual]:
+        """Some of the coordinates with their rates."""
+        return [Dual(y[i], [float(i == j) for j in range(self.size[0])]) for i in places]
+
+    def make_constant(self, known: Number) -> Number:
+        """What makes numbers with rates, which vanish, of the robot's numbers and lists of them."""
+        none = [0.0] * self.size[0]
+
+        def number(value: Any) -> Any:
+            return [number(each) for each in value] if np.ndim(value) else Dual(known(value), none)
+
+        return number
+
+    def parts(self, y: Sequence[Any], known: Number) -> tuple[list[Dual], list[Sequence[Dual]], list[Dual]]:
+        """g, the observed directions, and of limbs without a joint the reach margins less what a rod is to be long (of
+        those far away times w²), with their rates by the coordinates (n,), of which ``known`` makes numbers as well."""
+        error, number = self.error, self.make_constant(known)
+        w, point, turned, u = self._place_platform(y, known, number)
+        g, margins, told = list[Dual](), list[Dual](), list[Sequence[Dual]]()
+        least = self.shortest if self.short is None else 0.0
+        for i, limb in enumerate(error.limbs):
+            if self.short is not None and i == self.short[0]:
+                told.append(u)
+                continue
+            tip = plus(point, scale(w, number(error.p + limb.tip.constant)))
+            if np.any(limb.tip.turned):
+                tip = plus(tip, transform_vector(turned, number(limb.tip.turned)))
+            if i not in self.joints:
+                tip = plus(tip, scale(number(1.0) - w, number(limb.centre)))
+                margin, carried = limb.at(tip, number, limb.mode)
+                margins.append(margin - w * w * number(least**2))
+                told.append(carried)
+                continue
+            assert isinstance(limb, OnCrank | OnRail | SlidingRod)
+            assert limb.axis is not None
+            at, (one, two) = self.freedoms + self.joints.index(i), map(number, across(limb))
+            (z,) = self.unknowns(y, [at])
+            c, s = cosine(z), sine(z)
+            way, ring = minus(tip, scale(w, number(limb.centre))), plus(scale(c, one), scale(s, two))
+            if isinstance(limb, SlidingRod):
+                g.append(dot(way, minus(scale(c, two), scale(s, one))) - w * number(limb.aside))
+                told.append(ring)
+                continue
+            carried = scale(number(limb.radius), ring) if isinstance(limb, OnCrank) else scale(z, number(limb.axis))
+            rod = minus(way, carried)
+            if isinstance(limb, OnCrank):
+                # multiplied out: the square of the crank is known
+                g.append((dot(way, way) - number(limb.rod**2 - limb.radius**2)) * 0.5 - dot(way, carried))
+            else:
+                g.append((dot(rod, rod) - number(limb.rod**2)) * 0.5)
+            told.append(scale(number(1 / limb.rod), rod))
+        seen = list[Sequence[Dual]]()
+        for each in error.seen:
+            if each.limb is not None:
+                seen.append(scale(each.sense, told[each.limb]))
+            elif each.rule is not None:
+                seen.append(plus(transform_vector(turned, number(each.rule.turned)), number(each.rule.constant)))
+        return g, seen, margins
+
+    def _place_platform(
+        self, y: Sequence[Any], known: Number, number: Number
+    ) -> tuple[Dual, Components, list[Dual], list[Dual]]:
+        """w, the shift of the platform's point and the platform's rotation by rows, both times w, and u of a chart
+        about a short rod."""
+        k, x = self.error.shifts.shape[1], self.unknowns(y, range(self.freedoms))
+        w, place = number(1.0), list(x[:k])
+        if self.far is not None:
+            w, place[self.far] = x[self.far], w
+        point, u = combination(place, self.error.shifts, number), list[Dual]()
+        if self.short is not None:
+            v = [x[1], x[2]]
+            v.insert(self.short[1], w)
+            u = scale(number(1.0) / sqrt(dot(v, v)), v)
+            point = plus(number(self.ends[self.short[0]]), scale(x[0], u))
+        return w, point, self._rotate(y, w, known), u
+
+    def _rotate(self, y: Sequence[Any], w: Dual, known: Number) -> list[Dual]:
+        """w R by rows: R₀ + sin ψ K R₀ + (1 − cos ψ) K² R₀."""
+        R, k, n = self.error.R, self.error.shifts.shape[1], self.size[0]
+        if not self.error.turns.shape[1]:
+            return [w * Dual(known(each), [0.0] * n) for each in R.ravel()]
+        K, found = hat(self.error.turns[:, 0]), list[Dual]()
+        c, s = cosine(y[k]), sine(y[k])
+        for still, even, odd in zip((R + K @ K @ R).ravel(), (-K @ K @ R).ravel(), (K @ R).ravel(), strict=True):
+            value, rates = known(still) + known(even) * c + known(odd) * s, [0.0] * n
+            rates[k] = known(odd) * c - known(even) * s
+            if self.far is not None:
+                rates[self.far], value = value, y[self.far] * value
+            found.append(Dual(value, rates))
+        return found
+
+    @cached_property
+    def wanted(self) -> list[Components]:
+        """The desired directions."""
+        goal = self.goal
+        return [goal._direction(each, goal.p, goal.R.ravel(), lambda value: value) for each in goal.seen]
+
+    @cached_property
+    def closing(self) -> BoxFormula:
+        """g (k)."""
+        return of_robot(lambda y, number: [each.value for each in self.parts(y, number)[0]], self.size[0])
+
+    @cached_property
+    def ways(self) -> BoxFormula:
+        """Of each limb with a joint the tip from the centre: along the axis, and across it
+        (:func:`orthogonal_directions`)."""
+        error = self.error
+
+        def formula(y: Sequence[Any], number: Number) -> list[Any]:
+            found = list[Any]()
+            _, place, rotation, _ = self._place_platform(y, number, self.make_constant(number))
+            point, turned = ([each.value for each in some] for some in (place, rotation))
+            for i in self.joints:
+                limb = error.limbs[i]
+                assert isinstance(limb, OnCrank | OnRail | SlidingRod)
+                assert limb.axis is not None
+                way = plus(point, number(error.p + limb.tip.constant - limb.centre))
+                if np.any(limb.tip.turned):
+                    way = plus(way, transform_vector(turned, number(limb.tip.turned)))
+                found += [dot(way, number(each)) for each in (limb.axis, *across(limb))]
+            return found
+
+        return of_robot(formula, self.freedoms)
+
+    @cached_property
+    def errors(self) -> BoxFormula:
+        """u × u* of all that is observed."""
+        return of_robot(
+            lambda y, number: [e.value for u, wanted in self._directions(y, number) for e in cross(u, wanted)],
+            self.size[0],
+        )
+
+    @cached_property
+    def asked(self) -> BoxFormula:
+        """What vanishes where only such poses are asked for."""
+        return of_robot(
+            lambda y, number: [
+                each.value
+                for k, (u, wanted) in enumerate(self._directions(y, number))
+                for each in ([dot(u, wanted)] if k == self.square else cross(u, wanted))
+            ],
+            self.size[0],
+        )
+
+    @cached_property
+    def directions(self) -> BoxFormula:
+        """u of all that is observed."""
+        return of_robot(lambda y, number: [e.value for u, _ in self._directions(y, number) for e in u], self.size[0])
+
+    def _directions(self, y: Sequence[Any], number: Number) -> list[tuple[Sequence[Dual], list[Dual]]]:
+        """The observed directions and the desired ones."""
+        none = [0.0] * self.size[0]
+        return [
+            (u, [Dual(number(each), none) for each in wanted])
+            for u, wanted in zip(self.parts(y, number)[1], self.wanted, strict=True)
+        ]
+
+    @cached_property
+    def slopes(self) -> BoxFormula:
+        """g (k), its rates (k n), those of E (n), the reach margins of limbs without a joint."""
+        n, _ = self.size
+
+        def formula(y: Sequence[Any], number: Number) -> list[Any]:
+            g, _, margins = self.parts(y, number)
+            slopes = [-total(c.value * c.rates[j] for c in self._cosines(y, number)) for j in range(n)]
+            return [
+                *(each.value for each in g),
+                *(rate for each in g for rate in each.rates),
+                *slopes,
+                *(each.value for each in margins),
+            ]
+
+        return of_robot(formula, n)
+
+    @cached_property
+    def apart(self) -> list[tuple[int, list[int]]]:
+        """Of each point of the platform about which it turns on which legs act, one of these, and those that act
+        elsewhere; none where not all legs have joints and are watched: a leg that is not would push at its limit."""
+        if self.far is not None or self.short is not None or self.error.turns.shape[1] != 1:
+            return []
+        if not set(range(len(self.error.limbs))) == set(self.joints) == {each.limb for each in self.error.seen}:
+            return []
+        axis, found = self.error.R.T @ self.error.turns[:, 0], list[tuple[int, list[int]]]()
+        tips = [each.tip.turned for each in self.error.limbs]
+        for i, tip in enumerate(tips):
+            rest = [k for k, other in enumerate(tips) if np.abs(np.cross(axis, other - tip)).max() > EXACT]
+            if rest and rest not in [each for _, each in found]:
+                found.append((i, rest))
+        return found
+
+    @cached_property
+    def moments(self) -> BoxFormula:
+        """Moments that vanish at a critical point: those about a watched leg's tip, to which the legs there add
+        nothing. That of a leg is c (∂c g_θ − c_θ ∂g) / g_θ along a turn about the tip, all times all g_θ."""
+
+        def formula(y: Sequence[Any], number: Number) -> list[Any]:
+            error, k, found = self.error, self.error.shifts.shape[1], list[Any]()
+            g = self.parts(y, number)[0]
+            rotation = self._place_platform(y, number, self.make_constant(number))[2]
+            cosines = dict(zip([each.limb for each in error.seen], self._cosines(y, number), strict=True))
+            # all legs have joints, in their order
+            slopes = [each.rates[self.freedoms + i] for i, each in enumerate(g)]
+            for at, rest in self.apart:
+                arm = transform_vector([each.value for each in rotation], number(error.limbs[at].tip.turned))
+                way = cross(arm, number(error.turns[:, 0]))
+                along = [dot(way, number(each)) for each in error.shifts.T]
+                parts = []
+                for i in rest:
+                    c = cosines[i]
+                    of_c, of_g = (
+                        total([each.rates[k], *(a * b for a, b in zip(along, each.rates, strict=False))])
+                        for each in (c, g[i])
+                    )
+                    part = c.value * (of_c * slopes[i] - c.rates[self.freedoms + i] * of_g)
+                    for other in rest:
+                        part = part if other == i else part * slopes[other]
+                    parts.append(part)
+                found.append(total(parts))
+            return found
+
+        return of_robot(formula, self.size[0])
+
+    def _cosines(self, y: Sequence[Any], number: Number) -> list[Dual]:
+        return [dot(u, wanted) for u, wanted in self._directions(y, number)]
+
+    @cached_property
+    def bends(self) -> BoxFormula:
+        """Of coordinates and multipliers: the derivatives by the coordinates of ∇E + μ ∇g (n n) and of g (k n)."""
+        n, k = self.size
+        none = [0.0] * n
+
+        def formula(y: Sequence[Any], number: Number) -> list[Any]:
+            x, known = self.unknowns(y, range(n)), self.make_constant(number)
+            mu = [Dual(each, none) for each in y[n:]]
+            g, cosines = self.parts(x, known)[0], self._cosines(x, known)
+            rows = [
+                total(
+                    [
+                        *(c.value * c.rates[j] * -1.0 for c in cosines),
+                        *(each.rates[j] * own for each, own in zip(g, mu, strict=True)),
+                    ]
+                )
+                for j in range(n)
+            ]
+            return [
+                rate
+                for each in (*rows, *(each.value for each in g))
+                for rate in (each.rates if isinstance(each, Dual) else none)
+            ]
+
+        return of_robot(formula, n + k)
+
+
+def total(parts: Any) -> Any:
+    """Their sum, without a zero to begin with."""
+    first, *rest = parts
+    for each in rest:
+        first = first + each
+    return first
+
+
+def across(limb: OnCrank | OnRail | SlidingRod) -> tuple[Array, Array]:
+    """The directions from which a joint's angle counts, and to which it is a quarter of a turn."""
+    assert limb.axis is not None
+    one = np.linalg.svd(limb.axis[None])[2][1]
+    return one, np.cross(limb.axis, one)
+
+
+def _in_plane(error: PoseError, limb: ClosedFormLeg) -> ClosedFormLeg:
+    """A rod that slides, with the normal of the plane in which it stays as its axis."""
+    if not isinstance(limb, SlidingRod) or limb.axis is not None or error.shifts.shape[1] != 2:
+        return limb
+    normal = np.cross(*error.shifts.T)
+    off = [
+        normal @ (error.p + limb.tip.constant + error.R @ limb.tip.turned - limb.centre),
+        *(np.cross(normal, error.turns.T).ravel()),
+    ]
+    return limb if np.abs(off).max() > FOLLOWED else replace(limb, axis=normal)

@@ -1,0 +1,338 @@
+"""Rests of a loop of two watched legs, by the direction of the force that closes it.
+
+Two rods u₁, u₂ of constant length, their cranks or sliders and the platform between them close one vector equation,
+each term of which has variables of its own: r₁ u₁ + k + Σ f_j(q_j) = r₂ u₂. At a rest of E = ½ Σ (1 − (u_i · u_i*)²)
+there is a λ = |λ| n with n · f_j′(q_j) = 0 and, c_i = u_i · u_i*, with c₁ u₁* − r₁ λ along u₁, c₂ u₂* + r₂ λ along u₂.
+Where λ vanishes each u_i is along u_i* or at right angles to it. Elsewhere n, u₁ and u₁* lie in one plane. In polar
+coordinates about u₁*, n = cos t u₁* + sin t w(β), u₁ = cos θ u₁* + sin θ w(β), this is smooth; and with the joints as
+unknowns, which g_j = n · f_j′ tells, nothing is special where n lies along an axis. The closure tells u₂, which is a
+unit vector, lies in a plane with n and u₂*, and asks for the same |λ|:
+r₁ sin(t − θ) c₂ (u₂* × u₂) = r₂ cos θ sin θ (n × u₂).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ...batch.enclosures import BoxFormula
+from ...closed_forms.legs import OnCrank, OnRail, SlidingRod
+from ...geometry.affine import AffineForms, stack
+from ...geometry.components import Components, cosine, cross, dot, minus, plus, scale, sine
+from ...geometry.vectors import Array
+from ...tolerances import EXACT, FOLLOWED, MET_AGAIN, SMALLEST_BOX
+from .elimination import Flags, Places, away, pivots
+from .joint_bounds import narrow_joint as joint_bounds
+from .joint_error import JointError, across, of_robot
+from .pose_error import NotEnclosed, Number, PoseError
+from .subdivision import CriticalBox, Subdivision, forms_of, hull
+
+NARROWINGS = 16
+"""How many times the place of a zero is narrowed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Term:
+    """What a joint adds to the closure: ``size`` times a unit vector at right angles to ``axis`` that turns from
+    ``one``, or ``size`` times its travel along ``axis`` where that is None."""
+
+    size: float
+    axis: Array
+    one: Array | None = None
+
+    def at(self, z: Any, number: Number) -> tuple[Components, Components]:
+        """f and the unit vector along its rate."""
+        if self.one is None:
+            return scale(z, number(self.size * self.axis)), number(self.axis)
+        one, two, c, s = self.one, np.cross(self.axis, self.one), cosine(z), sine(z)
+        return (
+            plus(scale(c, number(self.size * one)), scale(s, number(self.size * two))),
+            minus(scale(c, number(two)), scale(s, number(one))),
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LoopError(JointError):
+    """The equations over β (in space), t, θ and the joints of the terms; ``joints`` are the watched limbs."""
+
+    @classmethod
+    def about(cls, error: PoseError) -> LoopError:
+        """Those of a pose's error; raises ``NotEnclosed`` where it is that of no such loop."""
+        joints = tuple(each.limb for each in error.seen if each.limb is not None)
+        if (
+            len(error.seen) != 2
+            or len(set(joints)) != 2
+            or not all(isinstance(error.limbs[i], OnCrank | OnRail) for i in joints)
+        ):
+            raise NotEnclosed("not two rods of constant length are watched")
+        found = cls(error, joints, error, shortest=0.0)
+        if error.turns.shape[1] > 1 or any(abs(each.size) < EXACT for each in found.terms):
+            raise NotEnclosed("the watched legs do not tell how the platform turns")
+        if error.shifts.shape[1] == 2:
+            normal = np.cross(*error.shifts.T)
+            off = [
+                *(normal @ each for each in found.desired),
+                *(
+                    np.linalg.norm(np.cross(normal, each.axis)) if each.one is not None else normal @ each.axis
+                    for each in found.terms
+                ),
+            ]
+        if error.shifts.shape[1] not in (2, 3) or (error.shifts.shape[1] == 2 and np.abs(off).max() > FOLLOWED):
+            raise NotEnclosed("the legs move neither in a plane nor in space")
+        return found
+
+    @cached_property
+    def over_pose(self) -> JointError:
+        """The same error over the pose and the joints of the watched limbs."""
+        return JointError(self.error, self.joints, self.error, shortest=0.0)
+
+    @property
+    def flat(self) -> int:
+        """How many watched directions are at right angles to the desired ones, the others along theirs, where rests
+        without a force fill curves or surfaces in space."""
+        return 1 if self.error.size > self.error.shifts.shape[1] else 2
+
+    @cached_property
+    def desired(self) -> list[Array]:
+        """u* of both rods."""
+        return [np.array(each) for each in self.wanted]
+
+    @cached_property
+    def terms(self) -> list[Term]:
+        """Those of the cranks or sliders, and of the platform's turn."""
+        found, error = list[Term](), self.error
+        for sign, i in zip((1.0, -1.0), self.joints, strict=True):
+            limb = error.limbs[i]
+            assert isinstance(limb, OnCrank | OnRail)
+            found.append(
+                Term(sign * limb.radius, limb.axis, across(limb)[0])
+                if isinstance(limb, OnCrank)
+                else Term(sign, limb.axis)
+            )
+        for axis in error.turns.T:
+            arm = self._arm - axis * (axis @ self._arm)
+            size = float(np.linalg.norm(arm))
+            found.append(Term(-size, axis, arm / size if size else arm))
+        return found
+
+    @property
+    def _arm(self) -> Array:
+        """From the second tip to the first at the goal, as far as it turns."""
+        one, two = (self.error.limbs[i].tip.turned for i in self.joints)
+        return np.asarray(self.error.R @ (one - two))
+
+    @property
+    def _still(self) -> Array:
+        """k."""
+        one, two = (self.error.limbs[i] for i in self.joints)
+        axes = self.error.turns
+        still = self._arm if not axes.shape[1] else axes @ (axes.T @ self._arm)
+        return np.asarray(one.centre - one.tip.constant - two.centre + two.tip.constant - still)
+
+    @property
+    def freedoms(self) -> int:
+        """Angles."""
+        return int(self.error.shifts.shape[1])
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Coordinates, and those of the equations that tell joints."""
+        return self.freedoms + len(self.terms), len(self.terms)
+
+    def box(self, low: Array, high: Array, reach: float) -> tuple[Array, Array]:
+        """The corners: n is meant but for its sign, and the sign of w."""
+        most = np.array([*(np.pi / 2 for _ in range(self.freedoms - 1)), np.pi])
+        inner, outer = self.over_pose.box(low, high, reach)
+        places = [*range(self.error.size, len(inner)), *range(self.freedoms, self.error.size)]
+        return np.concatenate([-most, inner[places]]), np.concatenate([most, outer[places]])
+
+    def vectors(self, y: Sequence[Any], number: Number) -> tuple[list[Components], list[Any]]:
+        """n, u₁ and u₂; and g."""
+        one, two = (self.error.limbs[i] for i in self.joints)
+        assert isinstance(one, OnCrank | OnRail)
+        assert isinstance(two, OnCrank | OnRail)
+        u, m = self.desired[0], self.freedoms
+        first = np.linalg.svd(u[None])[2][1] if m == 3 else np.cross(np.cross(*self.error.shifts.T), u)
+        w = (
+            number(first)
+            if m == 2
+            else plus(scale(cosine(y[0]), number(first)), scale(sine(y[0]), number(np.cross(u, first))))
+        )
+        n, rod = (plus(scale(cosine(z), number(u)), scale(sine(z), w)) for z in y[m - 2 : m])
+        tip, g = plus(scale(number(one.rod), rod), number(self._still)), list[Any]()
+        for z, term in zip(y[m:], self.terms, strict=True):
+            f, rate = term.at(z, number)
+            tip = plus(tip, f)
+            g.append(dot(n, rate))
+        return [n, rod, scale(number(1 / two.rod), tip)], g
+
+    def rest(self, y: Sequence[Any], number: Number) -> list[Any]:
+        """What is left beside g: the length of u₂; the force, across u₂; in space the plane of u₂."""
+        one, two = (self.error.limbs[i] for i in self.joints)
+        assert isinstance(one, OnCrank | OnRail)
+        assert isinstance(two, OnCrank | OnRail)
+        (n, _, u), _ = self.vectors(y, number)
+        t, theta = y[self.freedoms - 2 : self.freedoms]
+        wanted, across_u = number(self.desired[1]), cross(n, u)
+        force = minus(
+            scale(number(one.rod) * sine(t - theta) * dot(u, wanted), cross(wanted, u)),
+            scale(number(two.rod) * cosine(theta) * sine(theta), across_u),
+        )
+        length = (dot(u, u) - 1.0) * 0.5
+        if self.freedoms == 2:
+            return [length, dot(force, number(np.cross(*self.error.shifts.T)))]
+        return [length, *force, dot(across_u, wanted)]
+
+    @cached_property
+    def closing(self) -> BoxFormula:
+        return of_robot(lambda y, number: self.vectors(y, number)[1], self.size[0])
+
+    @cached_property
+    def left(self) -> BoxFormula:
+        """What is left beside g."""
+        return of_robot(self.rest, self.size[0])
+
+    @cached_property
+    def slips(self) -> BoxFormula:
+        """sin(t − θ) and n × u₂, which vanish together where the closure is singular."""
+
+        def formula(y: Sequence[Any], number: Number) -> list[Any]:
+            n, _, u = self.vectors(y, number)[0]
+            return [sine(y[self.freedoms - 2] - y[self.freedoms - 1]), *cross(n, u)]
+
+        return of_robot(formula, self.size[0])
+
+    @cached_property
+    def bends(self) -> BoxFormula:
+        """The rates of all equations, one after the other."""
+
+        def formula(y: Sequence[Any], known: Number) -> list[Any]:
+            x, number = self.unknowns(y, range(self.size[0])), self.make_constant(known)
+            return [rate for each in (*self.vectors(x, number)[1], *self.rest(x, number)) for rate in each.rates]
+
+        return of_robot(formula, self.size[0])
+
+    @cached_property
+    def ways(self) -> BoxFormula:
+        """Of each joint that turns, n along its axis and across it."""
+
+        def formula(y: Sequence[Any], number: Number) -> list[Any]:
+            n = self.vectors([*y, *(0.0 for _ in self.terms)], number)[0][0]
+            return [
+                dot(n, number(way))
+                for each in self.terms
+                if each.one is not None
+                for way in (each.axis, each.one, np.cross(each.axis, each.one))
+            ]
+
+        return of_robot(formula, self.freedoms)
+
+    @cached_property
+    def told(self) -> BoxFormula:
+        """Coordinates about the goal: shifts, the turn, the joints of the watched limbs."""
+
+        def formula(y: Sequence[Any], number: Number) -> list[Any]:
+            error, m = self.error, self.freedoms
+            limb = error.limbs[self.joints[0]]
+            assert isinstance(limb, OnCrank | OnRail)
+            rod = self.vectors(y, number)[0][1]
+            point = plus(
+                number(limb.centre - limb.tip.constant - error.p),
+                plus(scale(number(limb.rod), rod), self.terms[0].at(y[m], number)[0]),
+            )
+            arm = error.R @ limb.tip.turned
+            for axis, z in zip(error.turns.T, y[m + 2 :], strict=True):
+                c, s = cosine(z), sine(z)
+                point = minus(
+                    point, plus(scale(s, number(np.cross(axis, arm))), scale(c, number(arm - axis * (axis @ arm))))
+                )
+                arm = axis * (axis @ arm)
+            point = minus(point, number(arm))
+            return [*(dot(point, number(way)) for way in error.shifts.T), *y[m + 2 :], *y[m : m + 2]]
+
+        return of_robot(formula, self.size[0])
+
+    def enclose_chart(self, middle: Array, half: Array) -> tuple[Array, Array]:
+        found = self.told.together(forms_of(middle, half))
+        return found.low, found.high
+
+
+class LoopSubdivision(Subdivision):
+    """Boxes of these coordinates. At most one rest with a λ lies in each box that is settled as a zero; that there is
+    one is proved over the pose."""
+
+    error: LoopError
+
+    def _narrow(self, middle: Array, half: Array) -> tuple[Array, Array]:
+        low, high, m = middle - half, middle + half, self.error.freedoms
+        ways = self.error.ways.at(forms_of(middle, half)[:m])
+        turning = [k for k, each in enumerate(self.error.terms, m) if each.one is not None]
+        for k, i in enumerate(turning):
+            along, one, two = ((each.low, each.high) for each in ways[3 * k : 3 * k + 3])
+            rod = SlidingRod("", axis=self.error.terms[i - m].axis)
+            low[:, i], high[:, i] = joint_bounds(rod, along, one, two, (low[:, i], high[:, i]))
+        return low, high
+
+    def _settle(self, tube: list[AffineForms], P: Places, N: Places) -> tuple[Flags, AffineForms]:
+        F = self.error.left.together(tube)
+        settled = away(F, N.shape[1])
+        # where n may lie along both rods |λ| may have no bound: the closure itself may be singular
+        small = np.all(np.stack([each.spread for each in tube], axis=1) <= self.singular * self.whole, axis=1)
+        slips = self.error.slips.together(tube)
+        F.r[small & ~settled & ~np.any((slips.low > 0) | (slips.high < 0), axis=1)] = np.inf
+        return settled, F
+
+    def _multipliers(self, middle: Array, wide: Array, P: Places) -> tuple[AffineForms, Flags]:
+        none = AffineForms(np.zeros((middle.shape[1] + 1, len(middle), 0)), np.zeros((len(middle), 0)))
+        return none, np.ones(len(middle), dtype=bool)
+
+    def _equations(self, at: Array, forms: list[AffineForms]) -> tuple[AffineForms, AffineForms]:
+        still = forms_of(at, 0 * at)
+        F = stack([*self.error.closing.at(still), *self.error.left.at(still)])
+        K = self.error.bends.together(forms)
+        shape = (*F.r.shape, at.shape[1])
+        return F, AffineForms(K.v.reshape(-1, *shape), K.r.reshape(shape))
+
+    def _report(self, x: Array, reach: Array, frame: Array) -> list[CriticalBox]:
+        """The rests at zeros, each once: over the pose exactly one is proved in a box that holds all that lie in that
+        of the zero. Those are left out which a leg that is not watched does not reach; what is not decided is left
+        open."""
+        over, kept, reach = self.error.over_pose, list[int](), self._narrow_zeros(x)
+        y, (low, high) = np.mean(self.error.enclose_chart(x, 0 * x), axis=0), self.error.enclose_chart(x, reach)
+        room = np.maximum(high - y, y - low)
+        for k in range(len(x)):
+            apart = np.abs(y[kept] - y[k])
+            if not np.any(np.all(np.minimum(apart, np.abs(over.periods - apart)) + room[k] < MET_AGAIN, axis=1)):
+                kept.append(k)
+        x, reach, y, room = (each[kept] for each in (x, reach, y, room))
+        # as wide as the smallest boxes are to be in which a zero nearby is sought
+        whole = np.full(y.shape[1], max(1.0, float(room.max()) / SMALLEST_BOX))
+        part = Subdivision(over, -whole, whole)
+        P = pivots(part._values(forms_of(y, 0 * y))[1].v[0])[0]
+        settled = np.all(room < MET_AGAIN, axis=1) & part._unique(y, np.full(y.shape, MET_AGAIN), P, 1.0)
+        rest = np.flatnonzero(~settled)
+        if len(rest):
+            settled[rest] = part._near_zero(y[rest], room[rest], P[rest])
+        zeros = part.zeros()
+        if zeros:
+            forms = forms_of(*(np.array([getattr(each, name) for each in zeros]) for name in ("x", "radius")))
+            margins = stack([*part._values(forms)[3], 0.0 * forms[0] + 1.0])
+            reached, beyond = np.all(margins.low > 0, axis=1), np.any(margins.high < 0, axis=1)
+            for zero in (each for each, known in zip(zeros, reached | beyond, strict=True) if not known):
+                settled[np.abs(y - zero.x).max(axis=1).argmin()] = False
+            zeros = [each for each, good in zip(zeros, reached, strict=True) if good]
+        self.left += list(zip(x[~settled], reach[~settled], strict=True))
+        return zeros
+
+    def _narrow_zeros(self, x: Array) -> Array:
+        """How far from places (c, n) zeros are. With more equations than unknowns there need be none: what is told of
+        it is narrowed, from the whole room."""
+        at, room, frame = self._rooms()
+        reach = hull(room, frame) + np.abs(x - at)
+        for _ in range(NARROWINGS):
+            reach = np.fmin(reach, self._krawczyk(x, reach)[1])
+        return reach

@@ -1,0 +1,63 @@
+"""How single runs end, and which of them end alike."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...geometry.vectors import Array, pose_difference
+from ...results import Value
+from ...tolerances import RUNS_ALIKE
+from ..outcome import BOUNDARY, RunOutcome
+from .attraction_radius import CertifiedRadius
+from .flow import Flags, Places
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Outcome(Value):
+    """How a run ended that was simulated one by one; where it came to rest the platform's pose X (4, 4) and ‖e‖."""
+
+    ending: RunOutcome
+    X: Array | None = None
+    size: float = np.inf
+
+    def alike(self, other: Outcome, length: float) -> bool:
+        """Whether two runs end alike: at one pose, or for one reason."""
+        if self.X is None or other.X is None or self.ending.name != other.ending.name:
+            said = [
+                (each.ending.name, each.ending.reason if each.ending.name == BOUNDARY else "", each.X is None)
+                for each in (self, other)
+            ]
+            return said[0] == said[1]
+        return pose_difference(self.X, other.X, length) <= RUNS_ALIKE
+
+
+@dataclass(frozen=True, eq=False)
+class OutcomeCount:
+    """The outcomes of starts (n,) by their numbers; X (n, 4, 4) are the platform's poses there."""
+
+    outcomes: list[Outcome]
+    cells: Places
+    damped: Flags
+    X: Array
+    followed: int = 0
+    checked: int = 0
+    agreed: int = 0
+    certified: CertifiedRadius | None = None
+
+
+class Outcomes:
+    """Outcomes that are told apart."""
+
+    def __init__(self, length: float) -> None:
+        self.all: list[Outcome] = []
+        self.length = length
+
+    def number(self, outcome: Outcome) -> int:
+        """The number of an outcome, a new one if need be."""
+        for number, each in enumerate(self.all):
+            if each.alike(outcome, self.length):
+                return number
+        self.all.append(outcome)
+        return len(self.all) - 1

@@ -1,0 +1,334 @@
+"""The error of the directions as a function of the platform's pose, in the working mode of a goal: one formula for
+numbers and for enclosures.
+
+E = ½ Σ sin² ∠(u, u*) = ½ Σ (1 − (u · u*)²), u* the direction at the goal. With y the velocity of a rod's tip, t that of
+its other end and s = t · u, u̇ = g (y − t (u · y) / s), so that E's rate is Σ −c g (u* · y) + c g (u* · t) (u · y) / s,
+c = u · u*: s vanishes where the rod's leg is at its limit (Type 1), ± √reach margin / rod. Poses about the goal's have
+coordinates x: the point's shift along a basis (characteristic lengths), then γ = tan(θ/2) · axis of the turn (Cayley).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...analysis.aspects.leg_forms import LegPattern, pattern
+from ...analysis.aspects.path_segments import PathCoordinates, path_coordinates
+from ...analysis.aspects.vector_expressions import JointRules, NoLegForm
+from ...analysis.observed import ObservedRobot
+from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, OnRod, SlidingRod
+from ...closed_forms.platform_points import PlatformPoint, platform_point
+from ...constraints.named_vectors import BodyVector, NamedVector, poses_at
+from ...geometry.components import (
+    Components,
+    cayley,
+    combination,
+    cross,
+    dot,
+    minus,
+    plus,
+    scale,
+    spin,
+    sqrt,
+    transform_vector,
+)
+from ...geometry.vectors import Array
+from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.platform_motion import PlatformMotion
+from ...mechanism.observation import Observation
+from ...mechanism.observations.direction import Direction
+from ...results import Value
+from ...tolerances import EXACT, FOLLOWED
+
+Number = Callable[[Any], Any]
+Place = tuple[Components, Components]
+"""A pose: the point (3) and the platform's rotation (9, by rows)."""
+
+
+def _plain(value: Any) -> Any:
+    """A number of the robot, as it is."""
+    return value
+
+
+@dataclass(frozen=True, eq=False)
+class Twist:
+    """Velocity of the platform's point and its angular velocity (None where it never turns)."""
+
+    v: Components
+    w: Components | None
+
+
+class NotEnclosed(Exception):
+    """Why the error has no enclosure over poses: the reason, for the answer."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ObservedDirection(Value):
+    """An observed direction: ``sense`` times that of a limb's rod, or (``limb`` None) one that the pose turns."""
+
+    leg: str
+    sense: float
+    limb: int | None
+    rule: PlatformPoint | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Turning:
+    """An observed direction u, the one that is wanted, and u̇ along some directions of the coordinates: ``plain``[j] −
+    ``normal``[j] ``slip`` / ``along``, which vanishes at the leg's limit."""
+
+    u: Components
+    wanted: Components
+    plain: Sequence[Components]
+    normal: Sequence[Any]
+    slip: Components
+    along: Any
+
+    @property
+    def error(self) -> Components:
+        """e = u × u*."""
+        return cross(self.u, self.wanted)
+
+    @property
+    def rates(self) -> list[Components]:
+        """ė along each direction."""
+        return [
+            cross(minus(plain, scale(normal / self.along, self.slip)), self.wanted)
+            for plain, normal in zip(self.plain, self.normal, strict=True)
+        ]
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorRates:
+    """At poses: the legs' reach margins, and what the observed directions do."""
+
+    margins: Sequence[Any]
+    seen: Sequence[Turning]
+
+    @property
+    def E(self) -> Any:
+        """½ Σ |e|²."""
+        return 0.5 * sum(dot(e, e) for e in (each.error for each in self.seen))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PoseError(Value):
+    """The error about a goal, in its working mode: the pose (``p``, ``R``) from which coordinates count, by default the
+    goal's, the basis of shifts (3, k) and of turns (3, m), all limbs, what is observed. Lengths in characteristic
+    lengths."""
+
+    length: float
+    motion: PlatformMotion
+    p: Array
+    R: Array
+    shifts: Array
+    turns: Array
+    limbs: tuple[ClosedFormLeg, ...]
+    seen: tuple[ObservedDirection, ...]
+    fitted: tuple[str, ...] = ()
+    """What was fitted to samples and not read from the joints."""
+    limits: tuple[str, ...] = ()
+    """Joints whose limits are not looked at."""
+    coordinates: PathCoordinates | None = None
+    """What reads poses of configurations."""
+
+    @classmethod
+    def of(cls, setup: ObservedRobot, goal: ClosedConfiguration) -> PoseError:
+        """That of what is observed, about a configuration; raises ``NotEnclosed``."""
+        require_directions(setup)
+        configurations = [setup.all_samples.start, *setup.configurations]
+        reason = "the parts of the platform's pose that change depend on each other"
+        for each in path_coordinates(setup.decomposition, setup.samples.observation_model, setup.dof, configurations):
+            try:
+                return cls.along(setup, goal, each)
+            except NoLegForm as why:
+                reason = str(why)
+        raise NotEnclosed(reason)
+
+    @classmethod
+    def along(cls, setup: ObservedRobot, goal: ClosedConfiguration, coordinates: PathCoordinates) -> PoseError:
+        """That over what changes in the platform's pose; raises ``NotEnclosed``, or ``NoLegForm`` where a leg has
+        none."""
+        configurations, mechanism = [setup.all_samples.start, *setup.configurations], setup.mechanism
+        motion = coordinates.motion
+        known = pattern(setup.decomposition, [], coordinates, configurations)
+        # a leg on whose rail the point itself lies asks for nothing: the point's one shift goes along it
+        pairs = [
+            (limb, carried)
+            for limb, carried in zip(known.forms(goal).subchains, known.carried, strict=True)
+            if not (
+                isinstance(limb, OnRail)
+                and limb.rod <= EXACT
+                and motion.translations.shape[1] == 1
+                and not np.any(limb.tip.turned)
+            )
+        ]
+        read = JointRules.of(setup.decomposition, coordinates, configurations)
+        seen = tuple(_seen_direction(o, known, pairs, read, [goal, *configurations]) for o in setup.observed)
+        p, R = coordinates.of([goal])
+        rules = tuple(f"direction of leg {o.leg}" for o in seen if o.rule is not None and o.rule.fitted)
+        return cls(
+            coordinates.length,
+            motion,
+            p[0],
+            R[0],
+            motion.translations,
+            motion.rotations if coordinates.turning else np.zeros((3, 0)),
+            tuple(limb for limb, _ in pairs),
+            seen,
+            (*known.fitted, *rules),
+            (*mechanism.stops, *mechanism.tilt_limits),
+            coordinates=coordinates,
+        )
+
+    @property
+    def size(self) -> int:
+        """The number of coordinates."""
+        return int(self.shifts.shape[1] + self.turns.shape[1])
+
+    def pose(self, x: Components, number: Number) -> tuple[Components, Components]:
+        """p (3) and R (9, by rows) at coordinates x."""
+        k, R = self.shifts.shape[1], number(self.R.ravel())
+        if self.turns.shape[1]:
+            gamma = combination(x[k:], self.turns, number)
+            columns = [cayley(gamma, [R[3 * i + j] for i in range(3)]) for j in range(3)]
+            R = [columns[j][i] for i in range(3) for j in range(3)]
+        return plus(number(self.p), combination(x[:k], self.shifts, number)), R
+
+    @property
+    def mirrors(self) -> Array:
+        """Signs (2ᵏ, legs, 1) of the observed directions under which E is the same at a pose, all 1 first: a rod that
+        slides through a base point has its direction either way."""
+        both = [
+            k
+            for k, each in enumerate(self.seen)
+            if each.limb is not None and isinstance(leg := self.limbs[each.limb], SlidingRod) and leg.aside == 0
+        ]
+        signs = np.ones((2 ** len(both), len(self.seen), 1))
+        signs[:, both, 0] = list(product((1.0, -1.0), repeat=len(both)))
+        return signs
+
+    def at(self, x: Components, directions: Sequence[Components], number: Number) -> ErrorRates:
+        """What the error does at coordinates x, and along directions of the coordinates."""
+        p, R = self.pose(x, number)
+        goal = number(self.p), number(self.R.ravel())
+        twists = [self._twist(x, R, each, number) for each in directions]
+        margins = [limb.at(self._tip(limb, p, R, number)[0], number, limb.mode)[0] for limb in self.limbs]
+        return ErrorRates(margins, [self._turning(each, (p, R), goal, twists, number) for each in self.seen])
+
+    def levels(self, x: Array) -> tuple[NDArray[np.bool_], Array]:
+        """Whether all legs reach, and E, (n,), at coordinates (n, size)."""
+        with np.errstate(all="ignore"):
+            found = self.at(list(x.T), [], _plain)
+            reached = np.ones(len(x), dtype=bool)
+            for margin in found.margins:
+                reached &= margin > 0
+            return reached, np.broadcast_to(found.E, reached.shape)
+
+    def numbers(self, x: Array, directions: Array) -> tuple[Array, Array]:
+        """e (n, 3 legs) and its rates (n, 3 legs, directions) at coordinates (n, size)."""
+        with np.errstate(all="ignore"):
+            found = self.at(list(x.T), list(directions), _plain).seen
+            e = [np.broadcast_to(each, len(x)) for one in found for each in one.error]
+            rates = [
+                [np.broadcast_to(each, len(x)) for one in found for each in one.rates[j]]
+                for j in range(len(directions))
+            ]
+        return np.array(e).T, np.array(rates).transpose(2, 1, 0)
+
+    def _twist(self, x: Components, R: Components, rates: Components, number: Number) -> Twist:
+        """What rates of the coordinates move."""
+        k = self.shifts.shape[1]
+        w: Components | None = None
+        if self.turns.shape[1]:
+            gamma, rate = (combination(each[k:], self.turns, number) for each in (x, rates))
+            w = spin(gamma, rate, self.turns.shape[1] == 1)
+        return Twist(combination(rates[:k], self.shifts, number), w)
+
+    def _tip(self, limb: ClosedFormLeg, p: Components, R: Components, number: Number) -> tuple[Components, Components]:
+        """A limb's tip, and the tip from the point."""
+        arm: Components = transform_vector(R, number(limb.tip.turned)) if np.any(limb.tip.turned) else [0.0, 0.0, 0.0]
+        return plus(plus(p, number(limb.tip.constant)), arm), arm
+
+    def _turning(
+        self, seen: ObservedDirection, here: Place, goal: Place, twists: Sequence[Twist], number: Number
+    ) -> Turning:
+        """An observed direction, and how it changes with twists of the platform's point."""
+        wanted, u = self._direction(seen, *goal, number), self._direction(seen, *here, number)
+        if seen.limb is None:
+            plain = [[0.0, 0.0, 0.0] if each.w is None else cross(each.w, u) for each in twists]
+            return Turning(u, wanted, plain, [0.0] * len(twists), u, 1.0)
+        limb = self.limbs[seen.limb]
+        tip, arm = self._tip(limb, *here, number)
+        margin, carried = limb.at(tip, number, limb.mode)
+        tips = [each.v if each.w is None else plus(each.v, cross(each.w, arm)) for each in twists]
+        if isinstance(limb, OnRod):
+            gain, axis = seen.sense / number(limb.rod), number(limb.axis)
+            slip = cross(axis, minus(carried, number(limb.centre))) if isinstance(limb, OnCrank) else axis
+            # t · u, which is ∓ √margin / rod
+            along = (-limb.mode) * (gain * sqrt(margin))
+        else:
+            gain, slip, along = (seen.sense * limb.mode) / sqrt(margin), u, 1.0
+        return Turning(u, wanted, [scale(gain, y) for y in tips], [gain * dot(u, y) for y in tips], slip, along)
+
+    def _direction(self, seen: ObservedDirection, p: Components, R: Components, number: Number) -> Components:
+        """An observed direction at a pose, in its limb's working mode."""
+        if seen.rule is not None:
+            return plus(transform_vector(R, number(seen.rule.turned)), number(seen.rule.constant))
+        assert seen.limb is not None
+        limb = self.limbs[seen.limb]
+        tip = self._tip(limb, p, R, number)[0]
+        carried = limb.at(tip, number, limb.mode)[1]
+        return (
+            scale(seen.sense / number(limb.rod), minus(tip, carried))
+            if isinstance(limb, OnRod)
+            else scale(seen.sense, carried)
+        )
+
+
+def require_directions(setup: ObservedRobot) -> None:
+    """Raises ``NotEnclosed`` where something else is measured than directions, seen from the base."""
+    mechanism = setup.mechanism
+    others = [each for each in setup.observed if not isinstance(each, Direction)]
+    if others:
+        raise NotEnclosed(f"of leg {others[0].leg} something other than a direction is measured")
+    if mechanism.reference != mechanism.base or any(each.seen_from is not None for each in setup.observed):
+        raise NotEnclosed("directions are not seen from the base")
+    if mechanism.couplings:
+        raise NotEnclosed("joints are coupled")
+
+
+def _seen_direction(
+    observation: Observation,
+    known: LegPattern,
+    pairs: Sequence[tuple[ClosedFormLeg, NamedVector]],
+    read: JointRules,
+    configurations: Sequence[ClosedConfiguration],
+) -> ObservedDirection:
+    """Which limb's rod an observed direction is, at all configurations; raises ``NotEnclosed``."""
+    assert isinstance(observation, Direction)
+    feature = BodyVector("u", "observed", observation.link, observation.direction)
+    u = feature.value(poses_at(configurations, feature.links))
+    p, R = known.coordinates.of(configurations)
+    for i, (limb, carried) in enumerate(pairs):
+        if not isinstance(limb, OnRod | SlidingRod):
+            continue
+        held = carried.value(poses_at(configurations, carried.links))
+        rods = (limb.tip.value(p, R) - held) / limb.rod if isinstance(limb, OnRod) else held
+        for sense in (1.0, -1.0):
+            if np.max(np.abs(u - sense * rods)) < FOLLOWED:
+                return ObservedDirection(observation.leg, sense, i)
+    rule = read.rule(feature) or platform_point(u, p, R)
+    if rule is not None and not rule.follows:
+        # what does not turn with the platform is the same everywhere
+        if known.coordinates.turning and np.any(rule.turned) and np.any(rule.constant):
+            raise NotEnclosed(f"the direction of link {observation.link} turns in part with the platform")
+        return ObservedDirection(observation.leg, 1.0, None, rule)
+    raise NotEnclosed(
+        f"the direction of link {observation.link} of leg {observation.leg} is not that of a rod whose form is known"
+    )

@@ -1,0 +1,341 @@
+"""Critical points of the error on closed loops, sought from many starts at once and told apart. Nothing here proves
+anything."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...analysis.branch.carried_vectors import SweptChains
+from ...analysis.observed import ObservedRobot, restrict_samples
+from ...budgets import (
+    ENDING_DESCENTS,
+    ENDING_EFFORT,
+    ENDING_LATE,
+    ENDING_LATE_DESCENT,
+    ENDING_LEAST,
+    ENDING_ROUNDS,
+    ENDING_STARTS,
+    ENDING_WALK,
+    FARTHEST_ENDING,
+    POSE_WALKS,
+)
+from ...constraints.pattern import placing_links
+from ...errors import LoopsNotClosed
+from ...geometry.vectors import Array, times
+from ...kinematics.assembly import of_links
+from ...kinematics.branch_tests import Signature
+from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.limits import outside
+from ...kinematics.velocity_relation import relation
+from ...mechanism.observation import Observation
+from ...mechanism.observations.direction import SeenAxis
+from ...progress import report
+from ...results import Value
+from ...tolerances import CLOSURES_MEET, CRITICAL_FLAT, SAME_ENDING, SEEN_ABOVE
+from ..law import Law
+from .descent import CriticalPoint, are_closed, close_loops, descend, walk_at_random
+from .error import CriticalPointEquations, DirectionTerm, ErrorSystem
+
+BESIDE = 0.5
+"""So many times as many starts lie a few random steps beside rests that were found, where there are no closed forms."""
+WIDEST_SLIDE = 2.5
+"""Coordinate of a slide (characteristic lengths) up to which one is drawn, or farther where its limits are."""
+SLIDE_STEPS = 3
+"""Gauss and Newton's steps of slides alone: one does where the equations are linear in these."""
+FAMILY_TRIES = 8
+"""Points of one continuum, at most, of which one is to lie in the operation mode of the zero configuration."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CountedCriticalPoint(Value):
+    """A critical point, and how often it was met."""
+
+    point: CriticalPoint
+    met: int
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CriticalPoints(Value):
+    """What a search found: isolated critical points, and of those that fill curves or surfaces one for each value of E
+    and signs of the curvatures; how many ``starts`` there were, and how many of the isolated ones the last half of them
+    found first (``late``); how many only the search over the platform's pose found (``posed``), and an estimate of how
+    many more there are at least that such starts lead to (``unmet``, None where there was no such search)."""
+
+    isolated: tuple[CountedCriticalPoint, ...]
+    continua: tuple[CountedCriticalPoint, ...]
+    idle: int
+    starts: int
+    late: int
+    posed: int = 0
+    unmet: int | None = None
+
+    @property
+    def words(self) -> str:
+        """What was done, and how well it covers."""
+        also = f", {self.posed} more over the platform's pose" if self.posed else ""
+        also += f"; estimated, by how often each was met: at least {self.unmet} more" if self.unmet else ""
+        return (
+            f"found from {self.starts:,} random starts, {self.late} of {len(self.isolated) - self.posed} "
+            f"configurations first in the second half of these{also}"
+        )
+
+
+def starts(system: ErrorSystem, homes: Array, seed: int = 0, setup: ObservedRobot | None = None) -> Iterator[Array]:
+    """Rounds of closed configurations (c, N), where random walks from some (n, N) have come to; with a ``setting`` also
+    from random closings in its operation mode, and what has left that is called back."""
+    rng = np.random.default_rng(seed)
+    strict = False
+    if setup is not None:
+        drawn = anywhere(system, rng, ENDING_STARTS)
+        good, kept = in_mode(system, setup, drawn), in_mode(system, setup, homes)
+        kept[0] = True
+        homes, strict = np.concatenate([homes[kept], drawn[good]]), not (good.all() and kept.all())
+    q = homes[np.arange(ENDING_STARTS) % len(homes)]
+    while True:
+        q = walk_at_random(system, q, rng, ENDING_WALK)
+        if strict and setup is not None:
+            astray = ~in_mode(system, setup, q)
+            q[astray] = homes[rng.integers(len(homes), size=int(astray.sum()))]
+        yield q
+
+
+def critical_points(
+    system: ErrorSystem,
+    setup: ObservedRobot,
+    goal: ClosedConfiguration,
+    seed: int = 0,
+    *,
+    minima: bool = False,
+    rounds: Iterable[Array] | None = None,
+    further: Callable[[Array], Sequence[CriticalPoint]] | None = None,
+    fit: Callable[[Array], NDArray[np.bool_]] | None = None,
+) -> CriticalPoints:
+    """The critical points to which random walks from the samples and from random closings lead, in rounds, until the
+    later half of the starts finds few new ones; ``minima``: only descent, which finds what attracts; ``rounds``: of
+    :func:`starts`, where they are known; ``further`` finds more of them, from configurations (n, N), beside those that
+    ``fit``."""
+    seen = setup.samples.members[0].relation
+    idle, freedoms = seen.mobility - seen.dimension, seen.dimension
+    homes = np.array([system.system.read(at.pose) for at in (goal, *setup.configurations)])
+    rng = np.random.default_rng([seed, 1])
+    known = DistinctPoints(system, setup)
+    fresh: list[int] = []
+    farthest = FARTHEST_ENDING + float(reaches(system).max(initial=0.0))
+    points = descend(system, homes[:1], np.zeros(1, dtype=np.intp), idle, farthest)
+    most = max(ENDING_ROUNDS, ENDING_EFFORT // system.size[0])
+    met = [homes]
+    lies_near = not minima and further is None and all(isinstance(each, DirectionTerm) for each in system.terms)
+    most = most if further is None else int(POSE_WALKS * most)
+    for q in islice(rounds or starts(system, homes, seed, setup), most):
+        report("starts")
+        if lies_near and known.count:
+            # rests lie near each other
+            own = np.array([each.point.q for each in known.isolated])
+            some = own[rng.integers(len(own), size=round(BESIDE * len(q)))]
+            q = np.concatenate([q, walk_at_random(system, some, rng, 1 + len(fresh) % 3)])
+        # what attracts matters most: two of five starts go down all along
+        index = rng.integers(freedoms + 1, size=len(q)) * (rng.random(len(q)) < (0.0 if minima else 0.6))
+        points += descend(system, q, index, idle, farthest)
+        fresh.append(known.add(points))
+        points = []
+        met.append(q)
+        least, part = (ENDING_DESCENTS, ENDING_LATE_DESCENT) if minima else (ENDING_LEAST, ENDING_LATE)
+        if len(fresh) > least and sum(fresh[len(fresh) // 2 :]) <= part * known.count:
+            break
+    late, posed = sum(fresh[len(fresh) // 2 :]), 0
+    if further is not None:
+        if fit is not None:
+            known.keep(fit)
+            late = min(late, known.count)
+        pool = np.concatenate([*met, *(each.point.q[None] for each in known.isolated)])
+        posed = known.add(further(pool))
+    return CriticalPoints(known.isolated, known.continua, idle, sum(map(len, met[1:])), late, posed)
+
+
+class DistinctPoints:
+    """Critical points, told apart; those that are not isolated by E and the signs of the curvatures. Where joints are
+    free to move though the platform rests, one is kept that is beyond as few limits as any that was met."""
+
+    def __init__(self, system: ErrorSystem, setup: ObservedRobot) -> None:
+        self.system, self.setting, self.bodies = system, setup, placing_links(setup.decomposition)
+        self.told, self.freedoms = told_by(setup), setup.samples.members[0].relation.dimension
+        self.free = len(self.told) < len(setup.all_samples.observation_model.observations)
+        self.own: dict[tuple[int, ...], list[tuple[Array, CriticalPoint, int]]] = {}
+        self.families: dict[tuple[int, ...], list[CriticalPoint]] = {}
+
+    def add(self, points: Sequence[CriticalPoint]) -> int:
+        """How many isolated ones are new, of those that leave no loop open."""
+        new = 0
+        if points:
+            q = np.array([each.q for each in points])
+            good = are_closed(self.system, q, SAME_ENDING) & along_all(self.system, q)
+            points = [each for each, kept in zip(points, good, strict=True) if kept]
+        told = marks(self.system, self.setting, self.bodies, points, self.told)
+        for point, mark, across in zip(points, told, self._across(points), strict=True):
+            more = len(point.curvatures) > self.freedoms
+            least = CRITICAL_FLAT if more else SAME_ENDING * self.system.scale(point.curvatures)
+            flat = np.abs(point.curvatures) < least
+            key = (*(int(np.sum(each)) for each in (point.curvatures < -least, flat)),)
+            if flat.any():
+                key = (*key, round(point.value / SAME_ENDING), *across)
+                self.families.setdefault(key, []).append(point)
+                continue
+            own = self.own.setdefault(key, [])
+            near = next((k for k, each in enumerate(own) if np.abs(mark - each[0]).max() < SAME_ENDING), None)
+            if near is None:
+                own.append((mark, point, 1))
+                new += 1
+            else:
+                mark, kept, met = own[near]
+                if self.free and (most := self._beyond(kept)) and self._beyond(point) < most:
+                    kept = point
+                own[near] = (mark, kept, met + 1)
+        return new
+
+    def _across(self, points: Sequence[CriticalPoint]) -> list[list[int]]:
+        """Of each point, which of the observed directions are at right angles to the desired ones."""
+        terms = [each for each in self.system.terms if isinstance(each, DirectionTerm)]
+        if not terms or not points:
+            return [[] for _ in points]
+        carrier = SweptChains(self.system.system, list(np.array([each.q for each in points]).T))
+        cosines = [np.broadcast_to(each.cosine(carrier).value, len(points)) for each in terms]
+        return (np.abs(np.stack(cosines, axis=-1)) < SAME_ENDING).astype(int).tolist()
+
+    def _beyond(self, point: CriticalPoint) -> int:
+        """How many joints are beyond their limits."""
+        model = self.setting.all_samples.model
+        try:
+            return len(outside(model, of_links(model, partial(self.system.system.pose, values=point.q.tolist())).q))
+        except LoopsNotClosed:
+            return len(model.mechanism.joints)
+
+    def keep(self, fit: Callable[[Array], NDArray[np.bool_]]) -> None:
+        """Leave out those whose coordinates (c, N) do not fit."""
+        for key, own in self.own.items():
+            kept = fit(np.array([point.q for _, point, _ in own])) if own else ()
+            self.own[key] = [each for each, good in zip(own, kept, strict=True) if good]
+        for key, points in self.families.items():
+            kept = fit(np.array([point.q for point in points[:FAMILY_TRIES]])) if points else ()
+            self.families[key] = [each for each, good in zip(points, kept, strict=False) if good]
+
+    @property
+    def count(self) -> int:
+        """How many are isolated."""
+        return sum(map(len, self.own.values()))
+
+    @property
+    def continua(self) -> tuple[CountedCriticalPoint, ...]:
+        """One each of those that are not."""
+        return tuple(CountedCriticalPoint(points[0], len(points)) for points in self.families.values() if points)
+
+    @property
+    def isolated(self) -> tuple[CountedCriticalPoint, ...]:
+        """These, with how often each was met."""
+        return tuple(CountedCriticalPoint(point, met) for own in self.own.values() for _, point, met in own)
+
+
+def anywhere(system: ErrorSystem, rng: np.random.Generator, count: int) -> Array:
+    """Closed configurations (c, N) to which random coordinates lead, as many as close. From every other one the slides
+    alone are moved at first, as far as random turns need: what slides reach ends at no other limit."""
+    slides = np.array([each.slides for each in system.system.coordinates])
+    q = rng.uniform(-1.0, 1.0, (count, len(slides))) * np.where(slides, WIDEST_SLIDE, np.pi)
+    if slides.any():
+        wide = np.minimum(reaches(system), FARTHEST_ENDING) / WIDEST_SLIDE
+        q[::2] *= np.where(slides, 1 + rng.uniform(size=(len(q[::2]), 1)) * (wide - 1), 1.0)
+        for _ in range(SLIDE_STEPS):
+            G, DG = system.closures(q[::2])
+            q[::2, slides] -= times(np.linalg.pinv(DG[:, :, slides], rcond=CLOSURES_MEET), G)
+    q = close_loops(system, q, 40)
+    return q[are_closed(system, q)]
+
+
+def reaches(system: ErrorSystem) -> Array:
+    """How far (characteristic lengths) starts have each slide, (N,): to its limits where it has some; 0 of turns."""
+    loops = system.system
+    ends = {
+        stop.joint: max((abs(end) for end in (stop.lower, stop.upper) if np.isfinite(end)), default=0.0)
+        for stop in loops.mechanism.stops.values()
+    }
+    return np.array(
+        [
+            max(WIDEST_SLIDE, ends.get(each.joint, 0.0) / loops.length) if each.slides else 0.0
+            for each in loops.coordinates
+        ]
+    )
+
+
+def in_mode(system: ErrorSystem, setup: ObservedRobot, q: Array) -> NDArray[np.bool_]:
+    """Which of some closed configurations (c, N), regular ones, are of the operation mode of the zero configuration,
+    with all that is to be seen in front of its camera."""
+    drawn, kept = setup.all_samples, np.zeros(len(q), dtype=bool)
+    law = Law(setup.samples.observation_model, setup.dof, 1.0)
+    poses = {link: system.system.pose(link, q.T) for link in drawn.model.mechanism.links}
+    for k in range(len(q)):
+        try:
+            at = of_links(drawn.model, {link: X[k] for link, X in poses.items()}.__getitem__)
+        except LoopsNotClosed:
+            continue
+        kept[k] = law.in_front(at) > SEEN_ABOVE and (
+            not system.size[1] or drawn.signature.agrees(Signature.of(relation(at, drawn.observation_model)))
+        )
+    return kept
+
+
+def along_all(system: ErrorSystem, q: Array) -> NDArray[np.bool_]:
+    """At which of critical points (c, N) E is critical along all motions that the loops leave to first order: where two
+    families of closures meet, multipliers without bound would hold any slope across these."""
+    rates = system.closures(q)[1]
+    if system.supposes or not rates.shape[1]:
+        return np.ones(len(q), dtype=bool)
+    _, sizes, ways = np.linalg.svd(rates, full_matrices=False)
+    slopes = np.abs(times(ways, np.nan_to_num(CriticalPointEquations(system, list(q.T)).slope)))
+    return ~np.any((sizes < CLOSURES_MEET * sizes[:, :1]) & (slopes > CLOSURES_MEET), axis=1)
+
+
+def marks(
+    system: ErrorSystem,
+    setup: ObservedRobot,
+    bodies: Sequence[str],
+    points: Sequence[CriticalPoint],
+    told: Sequence[Observation] | None = None,
+) -> Array:
+    """What tells configurations (n, k) apart: the poses of the platform's bodies and the directions of all segments
+    that have one for each of these poses and what is measured (an arm's elbow that is free to move has not)."""
+    if not points:
+        return np.zeros((0, 0))
+    loops, links = system.system, system.system.mechanism.links
+    carrier = SweptChains(loops, list(np.array([each.q for each in points]).T))
+    parts = []
+    for body in bodies:
+        chain, X = loops.way(loops.body[body]), links[body].pose
+        parts.append(carrier.point(chain, X[:3, 3] / loops.length).value)
+        if setup.motion.body:
+            parts += [carrier.direction(chain, axis).value for axis in X[:3, :2].T]
+    for seen in told_by(setup) if told is None else told:
+        if isinstance(seen, SeenAxis):
+            parts.append(
+                carrier.direction(
+                    loops.way(loops.body[seen.link]), links[seen.link].pose[:3, :3] @ seen.direction
+                ).value
+            )
+    return np.concatenate([np.broadcast_to(each, (len(points), 3)) for each in parts], axis=-1)
+
+
+def told_by(setup: ObservedRobot) -> tuple[Observation, ...]:
+    """What can be observed of the robot that does not move where the platform and what is observed are held."""
+    every, own = setup.all_samples, [o.key for o in setup.observed]
+    held = setup.samples.members[0].relation.dimension
+    if every.members[0].relation.dimension == held:
+        return every.observation_model.observations
+    return tuple(
+        o
+        for o in every.observation_model.observations
+        if o.key in own
+        or restrict_samples(every, [*setup.observed, o], ways=False).members[0].relation.dimension == held
+    )
