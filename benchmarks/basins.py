@@ -30,10 +30,10 @@ def main(side: int = 100, single: int = 10) -> None:
     for name, legs, goal, grid in CASES:
         hrsynth.observe(name, legs)
         began = time.perf_counter()
-        found = hrsynth.basins(name, legs, to=goal, grid=grid.format(side))
+        found = hrsynth.basins(name, legs, goal=goal, grid=grid.format(side))
         passed = time.perf_counter() - began
         began = time.process_time()
-        hrsynth.basins(name, legs, to=goal, grid=grid.format(side), jobs=1)
+        hrsynth.basins(name, legs, goal=goal, grid=grid.format(side), jobs=1)
         spent = time.process_time() - began
         poses = [pose for pose, cell in zip(found.grid.poses(), found.cells.ravel(), strict=True) if cell >= 0]
         chosen = poses[:: max(1, len(poses) // single)][:single]

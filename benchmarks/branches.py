@@ -34,7 +34,7 @@ def proved(name: str, half: float) -> BranchProof | None:
         if joint.actuated:
             low, high = limits.get(joint.name, (-half, half))
             box[joint.name] = max(low, -half), min(high, half)
-    found = hrsynth.branch(name, box, effort=CELLS)
+    found = hrsynth.branch(name, box, max_cells=CELLS)
     return found if all(part.volume_fraction == 1.0 for part in found.parts) else None
 
 

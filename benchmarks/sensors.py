@@ -18,5 +18,7 @@ def asked(**options: object) -> None:
 
 
 if __name__ == "__main__":
-    directions, points = least(lambda: asked(observe="1,2,3"), lambda: asked(camera="eye=base@0.3,0.1,0", see=POINTS))
+    directions, points = least(
+        lambda: asked(observe="1,2,3"), lambda: asked(camera="eye=base@0.3,0.1,0", sensor=POINTS)
+    )
     print(f"three directions {directions:.3f} s, three image points {points:.3f} s: {points / directions:.2f} times")

@@ -95,7 +95,7 @@ class Screen:
 PICTURES: dict[str, str | Page | SitePage | Family | Screen] = {
     "accuracy_quattro.png": "accuracy quattro --observe 1,4 --cone 0.1deg --plane z=-0.7",
     "atlas_six_poses.png": Family("aspects", "six_poses"),
-    "basins_quattro.png": "basins quattro --observe 1,4 --to x=0,y=0,z=-0.7,phi=0 --plane z=-0.7,phi=0",
+    "basins_quattro.png": "basins quattro --observe 1,4 --goal x=0,y=0,z=-0.7,phi=0 --plane z=-0.7,phi=0",
     "catalog.png": Page(
         "catalog site --group spatial --base-motors --verdict controllable --motion 3R", "-o", 1250, 1100, "index.html"
     ),
@@ -115,7 +115,7 @@ PICTURES: dict[str, str | Page | SitePage | Family | Screen] = {
     "report_rrrrr_m1.png": report("rrrrr_m1"),
     "report_uranesx.png": report("uranesx"),
     "servo_3rpr.png": "servo 3rpr_m1 --start x=-0.08,y=-0.06,phi=-10deg --goal x=0.034,y=0.23,phi=23deg",
-    "servo_quattro.gif": f"servo quattro --observe 1,4 {FAR} --physics --sense pictures",
+    "servo_quattro.gif": f"servo quattro --observe 1,4 {FAR} --dynamics --sense images",
     "servo_quattro.png": f"servo quattro --observe 1,4 {FAR}",
     "site.png": SitePage("index.html", 1250, 1250),
     "studio_legs.webp": Screen("quattro", "lost"),

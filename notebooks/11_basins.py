@@ -38,7 +38,7 @@ def reached(found):
 # that (*antipodal*).
 
 # %%
-planar = hrsynth.basins("3rpr_m1", to="x=0,y=0,phi=0", grid="x=-0.3:0.3:21,y=-0.3:0.3:21,phi=0", jobs=1)
+planar = hrsynth.basins("3rpr_m1", goal="x=0,y=0,phi=0", grid="x=-0.3:0.3:21,y=-0.3:0.3:21,phi=0", jobs=1)
 print(planar)
 shown(planar)
 
@@ -55,12 +55,12 @@ shown(planar)
 
 # %%
 goal, starts = "x=0,y=0,z=-0.5,phi=0.3", "x=-0.5:0.5:11,y=-0.5:0.5:11,z=-0.6,phi=0.3"
-four = hrsynth.basins("quattro", to=goal, grid=starts, jobs=1)
+four = hrsynth.basins("quattro", goal=goal, grid=starts, jobs=1)
 print(four)
 shown(four)
 
 # %%
-two = hrsynth.basins("quattro", ["2", "3"], to=goal, grid=starts, jobs=1)
+two = hrsynth.basins("quattro", ["2", "3"], goal=goal, grid=starts, jobs=1)
 print(two)
 shown(two)
 assert 2.5 < reached(two) / reached(four) < 3

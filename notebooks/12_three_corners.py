@@ -27,7 +27,7 @@ CORNERS = np.array([[0.3, 0, 0], [-0.15, 0.25, 0], [-0.15, -0.25, 0]])
 def seeing(corners):
     """The free camera, and the corners that it sees."""
     return hrsynth.observe(
-        hrsynth.load(file), camera="eye=camera", see=[f"point:world@{x},{y},{z}" for x, y, z in corners]
+        hrsynth.load(file), camera="eye=camera", sensor=[f"point:world@{x},{y},{z}" for x, y, z in corners]
     )
 
 

@@ -258,7 +258,7 @@ WRITERS = {
     "path": ["--start", "x=0", "--goal", "x=0"],
     "servo": ["--start", "x=0", "--goal", "x=0"],
     "equilibria": ["--at", "x=0"],
-    "basins": ["--to", "x=0"],
+    "basins": ["--goal", "x=0"],
 }
 OTHERS = (
     ["import", "3prp", "--yes", "-o", "{}.urdf"],
@@ -398,7 +398,7 @@ def test_arguments_that_do_not_fit(run, arguments: list[str], words: list[str]):
         "derive delta --seed 1_0",
         "accuracy delta --cone ١deg",
         "accuracy delta --cone 1=０.5deg",
-        "advise delta --price leg=٢",
+        "advise delta --cost leg=٢",
         "check delta --at mode:٢",
         "check delta --grid x=0:1:٣",
         "servo delta --start z=-0.7 --goal z=-0.75 --noise ١deg",
@@ -452,7 +452,7 @@ def test_a_hidden_robot_of_one_leg_is_a_robot_again(run, tmp_path: Path, robot: 
         (["delta", "--unit", ""], "m, mm, cm, in"),
         (["delta", "--platform", ""], "rod_1a"),
         (["delta", "more"], "what hrsynth derive -h lists"),
-        (["spherical.urdf"], "--see direction:LINK/dx,dy,dz"),
+        (["spherical.urdf"], "--sensor direction:LINK/dx,dy,dz"),
     ],
 )
 def test_a_refusal_says_what_to_do(
@@ -467,7 +467,7 @@ def test_a_refusal_says_what_to_do(
 
 
 def test_a_spherical_robot_is_watched_by_directions_that_are_named(run, robot):
-    data = run("derive", robot(SPHERICAL), "--see", "direction:a/0,1,0", "--json").data
+    data = run("derive", robot(SPHERICAL), "--sensor", "direction:a/0,1,0", "--json").data
     assert (data["dof"], data["verdict"]) == (1, "controllable")
 
 
@@ -671,7 +671,7 @@ def test_advise_json_is_the_contract(run):
 def test_advise_json_has_the_place_and_axis_of_all_but_encoders():
     """A record and its link are enough to observe the same again."""
     found = hrsynth.advise("uranesx")
-    offered = hrsynth.advise("quattro", "1", offer="point:platform,inclination")
+    offered = hrsynth.advise("quattro", "1", candidate_sensor="point:platform,inclination")
     kinds = set()
     for each in (measurement for answer in (found, offered) for one in answer.sets for measurement in one.measurements):
         record, seen = each.to_dict(), each.observation
@@ -726,24 +726,27 @@ def test_advise_text_groups_the_cures(run, arguments: list[str], lines: list[str
 
 def test_advise_tries_what_is_offered(run):
     """Three rays that do not meet in a point hold a body; with one image point two more are needed, of any offered."""
-    words = ["gough_stewart", "--camera", "eye=base@0.3,0.1,0", "--see", "point:platform@0.1,0,0"]
-    data = run("advise", *words, "--offer", "point:platform", "--json").data
+    words = ["gough_stewart", "--camera", "eye=base@0.3,0.1,0", "--sensor", "point:platform@0.1,0,0"]
+    data = run("advise", *words, "--candidate-sensor", "point:platform", "--json").data
     check_record(data, "advise", "gough_stewart")
     offered = {m["of"] for each in data["sets"] for m in each["measurements"] if m["kind"] == "offered"}
     assert len(offered) == 4
     pairs = [each for each in data["sets"] if {m["kind"] for m in each["measurements"]} == {"offered"}]
     assert len(pairs) == 6
-    chosen = [text for m in pairs[0]["measurements"] for text in ("--see", m["of"])]
+    chosen = [text for m in pairs[0]["measurements"] for text in ("--sensor", m["of"])]
     assert run("derive", *words, *chosen, "--json").data["verdict"] == "controllable"
-    assert run("advise", *words, "--offer", "point:platform@0,0.1,0", "--json").data["sets"]
-    assert "--offer encoder:base: an encoder" in run("advise", "delta", "--offer", "encoder:base").refused()[0]
-    assert "--offer point:moon@" in run("advise", "delta", "--offer", "point:moon").refused()[0]
+    assert run("advise", *words, "--candidate-sensor", "point:platform@0,0.1,0", "--json").data["sets"]
+    assert (
+        "--candidate-sensor encoder:base: an encoder"
+        in run("advise", "delta", "--candidate-sensor", "encoder:base").refused()[0]
+    )
+    assert "--candidate-sensor point:moon@" in run("advise", "delta", "--candidate-sensor", "point:moon").refused()[0]
 
 
 def test_advise_names_the_joints_of_the_file(run):
-    """Two R that meet count as a U; an encoder is on one of the two, which `--see encoder:NAME` reads as well."""
+    """Two R that meet count as a U; an encoder is on one of the two, which `--sensor encoder:NAME` reads as well."""
     data = run(
-        "advise", "example:panda", "--camera", "hand=panda_hand", "--see", "point:world@0.5,0.1,0", "--json"
+        "advise", "example:panda", "--camera", "hand=panda_hand", "--sensor", "point:world@0.5,0.1,0", "--json"
     ).data
     joints = {m["of"] for each in data["sets"] for m in each["measurements"] if m["kind"] == "encoder"}
     assert joints <= {f"panda_joint{number}" for number in range(1, 8)}
@@ -1118,7 +1121,7 @@ def test_a_pose_that_is_not_reached_ends_with_3(
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(("module", "arguments"), [("mujoco", ["--physics"]), ("cv2", ["--sense", "pictures"])])
+@pytest.mark.parametrize(("module", "arguments"), [("mujoco", ["--dynamics"]), ("cv2", ["--sense", "images"])])
 def test_servo_names_the_extra_that_is_missing(run, monkeypatch: pytest.MonkeyPatch, module: str, arguments: list[str]):
     monkeypatch.setitem(sys.modules, module, None)
     (line,) = run("servo", "delta", "--start", "x=0,y=0", "--goal", "x=0.05,y=0", *arguments).refused(3)

@@ -26,7 +26,7 @@ DRAWN = {
     "aspects": ["aspects", "3rrr_m1", "--observe", "2,1,3"],
     "accuracy": ["accuracy", "rrrrr_m1", "--cone", "0.1deg", *GRID],
     "equilibria": ["equilibria", "prrrp_m1", "--at", "mode:1"],
-    "basins": ["basins", "rrrrr_m1", "--to", "x=0.02,y=0.24", "--grid", "x=0.01:0.02:2,y=0.24", "--jobs", "1"],
+    "basins": ["basins", "rrrrr_m1", "--goal", "x=0.02,y=0.24", "--grid", "x=0.01:0.02:2,y=0.24", "--jobs", "1"],
     "servo": ["servo", "rrrrr_m1", "--start", "x=0,y=0.2", "--goal", "x=0.02,y=0.22"],
     "singularities": ["singularities", "rrrrr_m1", "--points", "5", "--steps", "5"],
 }
@@ -146,7 +146,7 @@ def test_a_robot_without_strokes_is_not_in_the_legend(tmp_path: Path):
     setup = hrsynth.observe(
         hrsynth.load(file),
         camera="eye=body",
-        see=[f"point:world@{at}" for at in ("0.3,0,1", "-0.15,0.25,1", "-0.15,-0.25,1")],
+        sensor=[f"point:world@{at}" for at in ("0.3,0,1", "-0.15,0.25,1", "-0.15,-0.25,1")],
     )
     values = np.array([0.0, 1.0])
     plane = MapPlane.of((("x", values), ("y", values)), setup.motion, 0.3, 2.0)

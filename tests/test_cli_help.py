@@ -21,7 +21,7 @@ from hrsynth.cli import app, execute
 from hrsynth.cli.analyses import QUESTIONS
 from hrsynth.cli.completion import candidates
 from hrsynth.description import list_robots
-from hrsynth.options import OUTPUT, READING, WATCHING
+from hrsynth.options import OBSERVATION, OUTPUT, OVERRIDES
 
 ROOT: Any = app
 LEAVES = [(name,) for name, each in ROOT.commands.items() if not hasattr(each, "commands")] + [
@@ -59,8 +59,8 @@ def test_help_shows_every_option_in_its_group_and_its_examples(capsys, path: tup
 def test_every_question_has_examples_and_its_options_in_groups(capsys):
     for question in QUESTIONS:
         shown = called(capsys, question.name, "-h")
-        watched = (WATCHING,) * (question.name != "branch")  # which has to do with motors alone
-        assert all(f"\n{title}:\n" in shown for title in (*watched, OUTPUT, READING, "Examples"))
+        watched = (OBSERVATION,) * (question.name != "branch")  # which has to do with motors alone
+        assert all(f"\n{title}:\n" in shown for title in (*watched, OUTPUT, OVERRIDES, "Examples"))
 
 
 @pytest.mark.parametrize("width", ["50", "80", "200"])
@@ -155,7 +155,7 @@ def test_a_flag_can_be_denied_and_words_that_repeat_are_all_taken():
         ("derive quattro --seed 1.5", "--seed, found '1.5'"),
         ("derive quattro --seed=-1", "--seed, found '-1'"),
         ("servo delta --gain 1e9", "--gain, found '1e9', allowed: a number, at most 1e+06"),
-        ("modes delta --effort nan", "--effort, found 'nan'"),
+        ("modes delta --time-limit nan", "--time-limit, found 'nan'"),
         ("derive quattro a b", "derive takes no more arguments, found 'a b'"),
         ("derive quattro --at", "--at: expected one argument, allowed: POSE"),
         ("derive quattro -o --observe 1,4", "-o needs a value, found '--observe', allowed: FILE, or -o=--observe"),
@@ -208,22 +208,10 @@ def test_python_m_hrsynth_is_the_command_line():
     assert done[0].stdout.startswith("Usage: hrsynth ")
 
 
-def test_the_old_names_of_start_and_goal_are_taken_and_told(capsys):
-    for old, new in (("--from", "--start"), ("--to", "--goal")):
-        given = {"--start": "x=0.05", "--goal": "x=0.01"}
-        told = []
-        for name in (old, new):
-            arguments = [
-                part
-                for pair in ({**given, name: given[new]} | ({} if name == new else {new: None})).items()
-                if pair[1] is not None
-                for part in pair
-            ]
-            assert execute(["path", "rrrrr_m1", *arguments]) == 0
-            told.append(capsys.readouterr())
-        assert told[0].out == told[1].out
-        assert told[1].err == ""
-        assert told[0].err == f"hrsynth: {old} is now called {new}; the old name will be removed in 0.4\n"
+def test_the_old_names_of_start_and_goal_are_no_options(capsys):
+    for old in ("--from", "--to"):
+        assert execute(["path", "rrrrr_m1", "--start", "x=0.05", old, "x=0.01"]) == 2
+        assert f"path: no such option, found '{old}'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

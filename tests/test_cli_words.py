@@ -56,7 +56,7 @@ def test_a_turn_about_one_axis_is_told_in_one_way_however_it_was_typed(
 
 @pytest.mark.parametrize("command", ["modes", "aspects"])
 def test_what_is_held_is_called_what_it_is(printed, command: str):
-    assert "held      what is observed at" in printed(f"{command} 3rpr_m1 --see encoder:slide_1")
+    assert "held      what is observed at" in printed(f"{command} 3rpr_m1 --sensor encoder:slide_1")
     assert "held      the observed directions at" in printed(f"{command} 3rpr_m1")
 
 
@@ -184,7 +184,12 @@ def test_a_grid_says_what_it_held(printed, robot: str, grid: str, lines: list[st
 @pytest.mark.some(2)
 @pytest.mark.parametrize(
     "command",
-    ["legs quattro", "legs example:panda", "advise example:panda", "advise quattro --observe 1 --offer point:platform"],
+    [
+        "legs quattro",
+        "legs example:panda",
+        "advise example:panda",
+        "advise quattro --observe 1 --candidate-sensor point:platform",
+    ],
 )
 def test_tables_and_lists_are_not_wider_than_a_hundred_columns(printed, command: str):
     """No word is lost, and vectors stay whole."""
@@ -227,8 +232,8 @@ def test_a_turn_of_more_than_half_a_circle_without_a_unit_is_told_in_degrees(
 @pytest.mark.parametrize(
     ("command", "usual"),
     [
-        ("basins 3rrr_m1 --goal x=0", "--to"),
-        ("equilibria 3rrr_m1 --to x=0", "--at"),
+        ("basins 3rrr_m1 --at x=0", "--goal"),
+        ("equilibria 3rrr_m1 --at x=0", "--goal"),
         ("path 3rrr_m1 --at x=0", "--goal"),
     ],
 )

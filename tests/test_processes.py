@@ -16,7 +16,7 @@ from hrsynth.errors import WorkersLost
 from hrsynth.processes import run_shared
 
 COMMANDS = {
-    "basins": ["basins", "rrrrr_m1", "--to", "x=0.02,y=0.24", "--grid", "x=-0.2:0.2:45,y=0.1:0.3:45", "--jobs", "2"],
+    "basins": ["basins", "rrrrr_m1", "--goal", "x=0.02,y=0.24", "--grid", "x=-0.2:0.2:45,y=0.1:0.3:45", "--jobs", "2"],
     "equilibria": ["equilibria", "rrrrr_m1", "--at", "x=0.02", "--jobs", "2"],
     "build": ["catalog", "build", "planar", "-o", "built", "--workers", "2"],
     "site": ["catalog", "site", "--group", "planar", "-o", "site", "--workers", "2"],

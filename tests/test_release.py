@@ -114,7 +114,7 @@ SERVO = ["servo", "3rrr_m1", "--start", "x=0,y=0,phi=0", "--goal", "x=0.01,y=0,p
 NEEDING = [
     ("matplotlib", "plots", ["modes", "3rrr_m1", "-o", "modes.png"]),
     ("matplotlib", "plots", ["derive", "3rrr_m1", "--report", "report.html"]),
-    ("mujoco", "bench", [*SERVO, "--physics"]),
+    ("mujoco", "bench", [*SERVO, "--dynamics"]),
     ("mujoco", "bench", [*SERVO, "-o", "servo.gif"]),
     ("xacro", "xacro", ["check", XACRO]),
     ("xacro", "xacro", ["convert", XACRO, "robot.xml"]),

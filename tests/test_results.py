@@ -43,8 +43,8 @@ ASKED = {
     "lint": lambda: hrsynth.lint("quattro"),
     "path": lambda: hrsynth.path(hrsynth.load("3rrr_m1"), start="x=0.01,y=0,phi=0", goal="x=-0.01,y=0,phi=0.05"),
     "servo": lambda: hrsynth.servo(hrsynth.load("3rrr_m1"), start="x=0.01,y=0,phi=0", goal="x=-0.01,y=0,phi=0.05"),
-    "equilibria": lambda: hrsynth.equilibria(hrsynth.load("rrrrr_m1"), at="x=0,y=0.25"),
-    "basins": lambda: hrsynth.basins("rrrrr_m1", to="x=0,y=0.25", grid="x=-0.01:0.01:2,y=0.25", jobs=1),
+    "equilibria": lambda: hrsynth.equilibria(hrsynth.load("rrrrr_m1"), goal="x=0,y=0.25"),
+    "basins": lambda: hrsynth.basins("rrrrr_m1", goal="x=0,y=0.25", grid="x=-0.01:0.01:2,y=0.25", jobs=1),
     "select": lambda: hrsynth.select(
         hrsynth.load("3rrr_m1"), start="x=0.01,y=0,phi=0", goal="x=-0.01,y=0,phi=0.05", runs=1, examine=1
     ),

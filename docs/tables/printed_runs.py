@@ -20,7 +20,7 @@ class Replay:
     remark: str = ""
     gain: float = 0.8
     noise: str | None = None
-    physics: bool = False
+    dynamics: bool = False
     order: str = ""
     place: int = 0
     printed: tuple[float | None, float | None] = (None, None)

@@ -49,7 +49,7 @@ def compute_run(replay: Replay, seed: int = 0) -> Servo:
         goal=replay.way[1],
         gain=replay.gain,
         noise=replay.noise,
-        physics=replay.physics,
+        dynamics=replay.physics,
         time=BENCH_LASTS / replay.gain if replay.physics else None,
         seed=seed,
     )

@@ -18,14 +18,14 @@ from .records import resolve_hints
 
 NEEDED: Any = ...
 """The default of what must be given."""
-OWN, WATCHING, OUTPUT, READING = "Options", "What is watched", "Output", "What the file does not say"
+OWN, OBSERVATION, OUTPUT, OVERRIDES = "Options", "Observation", "Output", "File overrides"
 """Groups of options, in the order of the help."""
 
 
 @dataclass(frozen=True)
 class Option:
-    """One option or (``argument``) one word of the command line; ``flags`` are its names, by default its own; ``old``
-    ones are taken too, and told. ``words`` are what its value can be, where that can be told."""
+    """One option or (``argument``) one word of the command line; ``flags`` are its names, by default its own;
+    ``words`` are what its value can be, where that is known."""
 
     name: str
     help: str
@@ -38,9 +38,6 @@ class Option:
     argument: bool = False
     group: str = OWN
     words: Callable[[], Iterable[str]] | tuple[str, ...] = ()
-    old: tuple[str, ...] = ()
-    deprecated: str = ""
-    """Why it should not be given any more, and what to do instead."""
 
     @property
     def names(self) -> tuple[str, ...]:

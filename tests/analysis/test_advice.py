@@ -404,18 +404,18 @@ def test_every_robot_with_one_leg_observed(robot: str, camera: str | None) -> No
 # ---- prices
 
 
-def rank_of(robot: str, watched: list[str], see: list[str]) -> int:
-    return hrsynth.derive(robot, watched, "eye=base@0.3,0.1,0" if see else None, see=see or None).verdict.rank
+def rank_of(robot: str, watched: list[str], sensor: list[str]) -> int:
+    return hrsynth.derive(robot, watched, "eye=base@0.3,0.1,0" if sensor else None, sensor=sensor or None).verdict.rank
 
 
 @pytest.mark.some(1)
 @pytest.mark.parametrize("price", ["leg=0.9,point=0.7,direction=9,encoder=9,line=9", "point=1.5,encoder=4,leg=2", ""])
-def test_no_set_that_sees_as_much_is_cheaper(price: str) -> None:
+def test_no_set_that_sees_as_much_is_cheaper(cost: str) -> None:
     """Told sets see all and cost the same; of legs and points each cheaper set, asked by itself, sees less."""
     places = ["0.1,0,0", "-0.1,0.1,0", "0,-0.1,0.1"]
-    offer = ",".join(f"point:platform@{place}" for place in places)
-    told = hrsynth.advise("gough_stewart", ["1"], "eye=base@0.3,0.1,0", offer=offer, price=price)
-    costs = {kind: float(number) for kind, _, number in (part.partition("=") for part in price.split(",") if part)}
+    candidate_sensor = ",".join(f"point:platform@{place}" for place in places)
+    told = hrsynth.advise("gough_stewart", ["1"], "eye=base@0.3,0.1,0", candidate_sensor=candidate_sensor, cost=cost)
+    costs = {kind: float(number) for kind, _, number in (part.partition("=") for part in cost.split(",") if part)}
     assert told.cured
     paid = {each.cost for each in told.sets}
     assert max(paid) - min(paid) < 1e-9
@@ -427,8 +427,8 @@ def test_no_set_that_sees_as_much_is_cheaper(price: str) -> None:
             cost = legs * costs.get("leg", 1.0) + points * costs.get("point", 1.0)
             if cost < min(paid) - 1e-9:
                 watched = [str(k) for k in range(1, 2 + legs)]
-                see = [f"point:platform@{place}" for place in places[:points]]
-                assert rank_of("gough_stewart", watched, see) < 6, (legs, points)
+                sensor = [f"point:platform@{place}" for place in places[:points]]
+                assert rank_of("gough_stewart", watched, sensor) < 6, (legs, points)
 
 
 @pytest.mark.parametrize(
@@ -441,9 +441,9 @@ def test_no_set_that_sees_as_much_is_cheaper(price: str) -> None:
         ("leg=nan", "a positive number"),
     ],
 )
-def test_prices_that_are_none_are_refused(price: str, said: str) -> None:
+def test_prices_that_are_none_are_refused(cost: str, said: str) -> None:
     with pytest.raises(BadRequest, match=said):
-        hrsynth.advise("delta", ["1"], price=price)
+        hrsynth.advise("delta", ["1"], cost=cost)
 
 
 def test_offers_are_parted_at_kinds_alone() -> None:

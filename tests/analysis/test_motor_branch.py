@@ -247,18 +247,18 @@ SLOW = pytest.mark.slow
 def test_tubes_hold_what_small_steps_find(name, half):
     robot = load(name)
     box = {joint.name: (-half, half) for joint in robot.joints.values() if joint.actuated}
-    proof = branch(robot, box, effort=100)
+    proof = branch(robot, box, max_cells=100)
     assert proof.parts[0].volume_fraction == 1.0
     assert obeys(proof, np.random.default_rng(1), 3, 6) == 18
 
 
 @pytest.mark.long
 @pytest.mark.parametrize(("name", "least", "effort"), [("quattro", 0.009, 100), ("hexa", 0.004, 100)])
-def test_a_box_much_too_large_is_proved_about_zero(name, least, effort):
+def test_a_box_much_too_large_is_proved_about_zero(name, least, max_cells):
     """Whole turns of four and six motors: cells no larger than the one about zero that is proved, most of which are."""
-    proof = branch(name, effort=effort)
+    proof = branch(name, max_cells=max_cells)
     (part,) = proof.parts
-    assert len(part.cells) > effort // 2
+    assert len(part.cells) > max_cells // 2
     assert np.all(np.abs(part.proved) >= least)
     assert connected(part)
     assert obeys(proof, np.random.default_rng(2), 3, 10) == 30
@@ -343,7 +343,7 @@ def test_limits_that_limit_nothing_are_a_whole_turn():
     wide = robot.changed(
         joints=[replace(joint, limits=Limits(-1e9, 1e9)) for joint in robot.joints.values() if joint.actuated]
     )
-    found = branch(wide, effort=2)
+    found = branch(wide, max_cells=2)
     assert found.box == "a whole turn"
     assert np.array(found.parts[0].requested_box).ravel() == pytest.approx([-np.pi, np.pi])
 

@@ -84,7 +84,7 @@ def watched(mechanism: Mechanism, kind: str) -> ObservedRobot:
         centre = mechanism.links[mechanism.platform].pose[:3, 3] + far * random_direction(rng)
         local = np.linalg.inv(mechanism.links[link].pose) @ pose(centre)
         cameras.append(f"{name}={link}@" + ",".join(map(str, local[:3, 3])) + "/0.3,-0.2,0.1")
-    return ObservedRobot.of(mechanism, camera=cameras, see=asked(mechanism, kind, rng), samples=5)
+    return ObservedRobot.of(mechanism, camera=cameras, sensor=asked(mechanism, kind, rng), samples=5)
 
 
 def certified(mechanism: Mechanism, kind: str, form: str = "simplified") -> Derivation:
@@ -109,7 +109,7 @@ def test_every_kind_is_certified(robot: str, kind: str) -> None:
     mechanism = load(robot) if robot in list_robots() else {"free_body": free_body, "arm": arm}[robot]()
     if robot == "free_body" and kind == "encoder":
         with pytest.raises(BadRequest, match="one with one axis or two"):
-            ObservedRobot.of(mechanism, see="encoder:free")
+            ObservedRobot.of(mechanism, sensor="encoder:free")
         return
     assert certified(mechanism, kind).verdict.rank > 0
 
@@ -149,11 +149,11 @@ def test_all_kinds_together_are_certified_on_every_robot(robot: str) -> None:
     """Each lift is a step that is certified alone."""
     mechanism = robot_of(robot)
     every = [watched(mechanism, kind) for kind in KINDS]
-    see = [word for kind in KINDS for word in asked(mechanism, kind, np.random.default_rng(KINDS.index(kind)))]
+    sensor = [word for kind in KINDS for word in asked(mechanism, kind, np.random.default_rng(KINDS.index(kind)))]
     cameras = [f"{c.name}={c.link}@" + ",".join(map(str, c.pose[:3, 3])) for c in every[0].robot.cameras]
-    found = derive(mechanism, camera=cameras, see=see)
+    found = derive(mechanism, camera=cameras, sensor=sensor)
     assert found.equivalence.passed
-    assert sum(step.rule == "lift" and step.accepted for step in found.steps) == len(see)
+    assert sum(step.rule == "lift" and step.accepted for step in found.steps) == len(sensor)
 
 
 @pytest.mark.long
@@ -182,12 +182,12 @@ def eye_in_hand(mechanism: Mechanism, count: int) -> ObservedRobot:
     return ObservedRobot.of(
         mechanism,
         camera=f"hand={mechanism.platform}",
-        see=["point:world@" + ",".join(map(str, place)) for place in places],
+        sensor=["point:world@" + ",".join(map(str, place)) for place in places],
     )
 
 
 def test_three_points_of_a_free_body_are_three_ups() -> None:
-    found = derive(free_body(), see=POINTS[:3])
+    found = derive(free_body(), sensor=POINTS[:3])
     assert found.hidden_architecture is not None
     assert found.hidden_architecture.unicode == "3-U̲PS"
     assert (str(found.architecture), found.verdict.verdict, found.verdict.rank) == ("6", "controllable", 6)
@@ -231,7 +231,7 @@ def test_verdicts_agree_with_pixels_of_the_arm(count: int) -> None:
 
 def test_a_leg_that_carries_what_is_observed_or_sees_is_never_removed() -> None:
     """A point on a rod, a camera on another, an encoder in a third."""
-    found = derive("gough_stewart", camera="eye=rod_2", see=["point:rod_1@0,0,0.1", "encoder:slide_3"])
+    found = derive("gough_stewart", camera="eye=rod_2", sensor=["point:rod_1@0,0,0.1", "encoder:slide_3"])
     refused = {step.leg: step.reason for step in found.steps if step.rule == "leg removal" and not step.accepted}
     assert {"1", "2", "3"} <= refused.keys()
     assert all("carries what is observed or sees" in refused[leg] for leg in ("1", "2", "3"))
@@ -241,7 +241,7 @@ def test_a_leg_that_carries_what_is_observed_or_sees_is_never_removed() -> None:
 
 def test_motions_that_move_an_observed_value_are_not_idle() -> None:
     """A rod that spins between two balls, seen by a camera."""
-    plain, watched_ = (ObservedRobot.of("delta", see=see) for see in (None, ["point:rod_1a@0.05,0.02,-0.1"]))
+    plain, watched_ = (ObservedRobot.of("delta", sensor=sensor) for sensor in (None, ["point:rod_1a@0.05,0.02,-0.1"]))
     assert plain.mobility.total == watched_.mobility.total
     assert plain.mobility.internal == watched_.mobility.internal + 1
 
@@ -256,9 +256,9 @@ def test_what_always_goes_through_the_camera_s_centre_is_refused(kind: str, seed
     here, there = (
         ",".join(map(str, transform(np.linalg.inv(mechanism.links[link].pose), joint.point))) for link in joint.links
     )
-    see = f"eye={kind}:{joint.links[1]}@{there}" + ("/0.3,0.4,0.5" if kind == "image_line" else "")
+    sensor = f"eye={kind}:{joint.links[1]}@{there}" + ("/0.3,0.4,0.5" if kind == "image_line" else "")
     with pytest.raises(UndefinedValue, match="camera's centre"):
-        ObservedRobot.of(mechanism, camera=[f"eye={joint.links[0]}@{here}"], see=[see])
+        ObservedRobot.of(mechanism, camera=[f"eye={joint.links[0]}@{here}"], sensor=[sensor])
 
 
 def circumcircle(points: Array) -> tuple[Array, float, Array]:

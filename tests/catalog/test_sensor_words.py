@@ -109,10 +109,10 @@ def test_known_answers():
     assert catalog["6(Utn-Pl*-S)@inclination"]["rank"] == 2
     assert catalog["3(Rz*-Rz-Rz)@inclination"]["verdict"] == "uncontrollable"
     assert catalog["3(Rz*-Rz-Rz)@2point"]["verdict"] == "controllable"
-    asked = load(see="3point")
+    asked = load(sensor="3point")
     assert {each["word"].partition("@")[2] for each in asked} == {"3point"}
-    assert {each["see"] for each in load(see="point+point+point")} == {"3point"}
-    assert len(load(see="3point", verdict="controllable")) >= 5
+    assert {each["see"] for each in load(sensor="point+point+point")} == {"3point"}
+    assert len(load(sensor="3point", verdict="controllable")) >= 5
     assert not any("@" in word for word in load().words)
 
 
@@ -126,14 +126,14 @@ def test_the_command_line_lists_and_shows_them(capsys: pytest.CaptureFixture[str
         capsys.readouterr()
         return execute(["catalog", *words]), capsys.readouterr().out
 
-    listed = json.loads(call("list", "--see", "3point", "--verdict", "controllable", "--json")[1])
+    listed = json.loads(call("list", "--sensor", "3point", "--verdict", "controllable", "--json")[1])
     assert listed["total"] == len(LISTED)
     assert all(each["see"] == "3point" for each in listed["entries"])
     Draft202012Validator(schema("catalog list")).validate(listed)
     shown = call("show", "6(Utn-Pl*-S)@3point")[1]
     assert "seen of the platform: 3point" in shown
     assert "danger cylinder" in shown
-    assert call("list", "--see", "3dot")[0] == call("site", "-o", "nowhere", "--group", "sensors")[0] == 2
+    assert call("list", "--sensor", "3dot")[0] == call("site", "-o", "nowhere", "--group", "sensors")[0] == 2
 
 
 def test_a_word_is_one_value():

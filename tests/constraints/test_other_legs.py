@@ -149,6 +149,6 @@ def test_a_held_leg_that_stops_the_turn_in_the_plane_is_no_line_of_it() -> None:
     made.joint("end", "R", "rod_1", "platform", (0.2, 0.4, 0), axis=(0, 0, 1), loop=True)
     made.observe("bar", "bar", (0.8, 0.6, 0))
     made.observe("rod", "rod_1", (-0.7, -0.3, 0))
-    answer = singularities(made.build("platform"), ["bar", "rod_1"], see=["encoder:rail"], points=20)
+    answer = singularities(made.build("platform"), ["bar", "rod_1"], sensor=["encoder:rail"], points=20)
     assert answer.checked is not None
     assert (answer.verdict.rank, answer.checked.disagreements) == (3, 0)

@@ -144,37 +144,55 @@ def test_what_is_wrong_in_a_file_is_said_in_its_line(line: str, said: str, tmp_p
 
 
 ASKED_WRONG = [
-    (["--see", "point"], "--see, found 'point', allowed: "),
-    (["--see", "point:platform"], "where on the link"),
-    (["--see", "point:platform@1,2"], "observe point: at, found '1 2', allowed: 3 numbers"),
-    (["--see", "point:thing@1,2,3"], "unknown link, found 'thing', allowed: base"),
-    (["--see", "=point:platform@1,2,3"], "--see =point:platform@1,2,3: the camera's name, found ''"),
-    (["--see", "point:platform@1,2,3,"], "an empty number, found '1,2,3,'"),
-    (["--see", "line:platform@1,2,3/0,0,0"], "--see line:platform@1,2,3/0,0,0: observe line: axis, found '0 0 0'"),
-    (["--see", "direction:platform/0,0,0"], "--see direction:platform/0,0,0: observe direction: axis, found '0 0 0'"),
-    (["--see", "image_circle:platform@1,2,3/0,0,1/-1"], "radius (m), found -1.0, allowed: more than 0"),
-    (["--camera", "eye=base@0,0,0,"], "--camera eye=base@0,0,0,: an empty number"),
-    (["--camera", "eye=base@0,0,0"], "a camera to which nothing is given to see, found 'eye', allowed: --see eye="),
+    (["--sensor", "point"], "--sensor, found 'point', allowed: "),
+    (["--sensor", "point:platform"], "where on the link"),
+    (["--sensor", "point:platform@1,2"], "observe point: at, found '1 2', allowed: 3 numbers"),
+    (["--sensor", "point:thing@1,2,3"], "unknown link, found 'thing', allowed: base"),
+    (["--sensor", "=point:platform@1,2,3"], "--sensor =point:platform@1,2,3: the camera's name, found ''"),
+    (["--sensor", "point:platform@1,2,3,"], "an empty number, found '1,2,3,'"),
     (
-        ["--camera", "eye=base", "--camera", "far=base", "--see", "eye=point:platform@1,2,3"],
-        "a camera to which nothing is given to see, found 'far', allowed: --see far=",
+        ["--sensor", "line:platform@1,2,3/0,0,0"],
+        "--sensor line:platform@1,2,3/0,0,0: observe line: axis, found '0 0 0'",
     ),
-    (["--see", "line:platform@1,2,3"], "without the attribute, found 'axis'"),
-    (["--see", "point:platform@1,2,3/0,0,1"], "more than the kind needs, found '0,0,1', allowed: at"),
     (
-        ["--see", "direction:platform@0,0,0/1,0,0"],
+        ["--sensor", "direction:platform/0,0,0"],
+        "--sensor direction:platform/0,0,0: observe direction: axis, found '0 0 0'",
+    ),
+    (["--sensor", "image_circle:platform@1,2,3/0,0,1/-1"], "radius (m), found -1.0, allowed: more than 0"),
+    (["--camera", "eye=base@0,0,0,"], "--camera eye=base@0,0,0,: an empty number"),
+    (["--camera", "eye=base@0,0,0"], "a camera to which nothing is given to see, found 'eye', allowed: --sensor eye="),
+    (
+        ["--camera", "eye=base", "--camera", "far=base", "--sensor", "eye=point:platform@1,2,3"],
+        "a camera to which nothing is given to see, found 'far', allowed: --sensor far=",
+    ),
+    (["--sensor", "line:platform@1,2,3"], "without the attribute, found 'axis'"),
+    (["--sensor", "point:platform@1,2,3/0,0,1"], "more than the kind needs, found '0,0,1', allowed: at"),
+    (
+        ["--sensor", "direction:platform@0,0,0/1,0,0"],
         "a place, of which the kind direction has none, found '0,0,0', allowed: direction:LINK/dx,dy,dz",
     ),
-    (["--see", "encoder:shoulder_1@0,0,0"], "a place, of which the kind encoder has none, found '0,0,0'"),
-    (["--see", "ear=point:platform@1,2,3"], "unknown camera, found 'ear', allowed: none is named"),
-    (["--camera", "a=base", "--camera", "a=rod_1", "--see", "point:platform@1,2,3"], "a second camera of this name"),
-    (["--camera", "a=base", "--camera", "b=rod_1", "--see", "point:platform@1,2,3"], "by which camera, allowed: a=po"),
-    (["--camera", "a=base@1,2", "--see", "point:platform@1,2,3"], "--camera a=base@1,2, found '1,2', allowed: 3 num"),
-    (["--camera", "a=base@1deg,2,3", "--see", "point:platform@1,2,3"], "found '1deg,2,3', allowed: metres"),
-    (["--camera", "a=base@1,2,3/1,2,3/4/5", "--see", "point:platform@1,2,3"], "found 'a=base@1,2,3/1,2,3/4/5'"),
-    (["--camera", "a=base@1,2,3/1,2,3/4,5", "--see", "point:platform@1,2,3"], "found '4,5', allowed: the focal length"),
-    (["--camera", "a=base@1,2,3/1,2,3/-4", "--see", "point:platform@1,2,3"], "found '-4', allowed: the focal length"),
-    (["--camera", "nowhere", "--see", "point:platform@1,2,3"], "has no link for the camera, found 'nowhere'"),
+    (["--sensor", "encoder:shoulder_1@0,0,0"], "a place, of which the kind encoder has none, found '0,0,0'"),
+    (["--sensor", "ear=point:platform@1,2,3"], "unknown camera, found 'ear', allowed: none is named"),
+    (["--camera", "a=base", "--camera", "a=rod_1", "--sensor", "point:platform@1,2,3"], "a second camera of this name"),
+    (
+        ["--camera", "a=base", "--camera", "b=rod_1", "--sensor", "point:platform@1,2,3"],
+        "by which camera, allowed: a=po",
+    ),
+    (
+        ["--camera", "a=base@1,2", "--sensor", "point:platform@1,2,3"],
+        "--camera a=base@1,2, found '1,2', allowed: 3 num",
+    ),
+    (["--camera", "a=base@1deg,2,3", "--sensor", "point:platform@1,2,3"], "found '1deg,2,3', allowed: metres"),
+    (["--camera", "a=base@1,2,3/1,2,3/4/5", "--sensor", "point:platform@1,2,3"], "found 'a=base@1,2,3/1,2,3/4/5'"),
+    (
+        ["--camera", "a=base@1,2,3/1,2,3/4,5", "--sensor", "point:platform@1,2,3"],
+        "found '4,5', allowed: the focal length",
+    ),
+    (
+        ["--camera", "a=base@1,2,3/1,2,3/-4", "--sensor", "point:platform@1,2,3"],
+        "found '-4', allowed: the focal length",
+    ),
+    (["--camera", "nowhere", "--sensor", "point:platform@1,2,3"], "has no link for the camera, found 'nowhere'"),
 ]
 
 
@@ -194,7 +212,7 @@ def test_commands_that_know_segments_only_say_so(
     command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     save(with_sights(load("delta"), [parse_see("point:platform@0,0,0.1", [])]), tmp_path / "delta.urdf")
-    words = ["--start", "x=0", "--goal", "x=0.01", "--physics"]
+    words = ["--start", "x=0", "--goal", "x=0.01", "--dynamics"]
     assert execute([command, str(tmp_path / "delta.urdf"), *words]) == 2
     assert "knows directions of segments only" in capsys.readouterr().err
 
@@ -221,13 +239,15 @@ def test_commands_read_what_a_file_observes(words: str, tmp_path: Path, capsys: 
 
 
 def test_the_command_line_and_python_see_the_same(capsys: pytest.CaptureFixture[str]) -> None:
-    see = ["point:platform@0.1,0,0", "hand=point:world@0,0,-1", "direction:rod_1/0,0,1", "encoder:slide_1"]
+    sensor = ["point:platform@0.1,0,0", "hand=point:world@0,0,-1", "direction:rod_1/0,0,1", "encoder:slide_1"]
     cameras = ["eye=base@0.3,0.1,0/10deg,0,0", "hand=platform@0,0,0.1"]
-    words = [word for name, texts in (("--see", see), ("--camera", cameras)) for text in texts for word in (name, text)]
-    see[0] = words[1] = "eye=" + see[0]
+    words = [
+        word for name, texts in (("--sensor", sensor), ("--camera", cameras)) for text in texts for word in (name, text)
+    ]
+    sensor[0] = words[1] = "eye=" + sensor[0]
     assert execute(["check", "gough_stewart", "--observe", "1", *words, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)["observed"]
-    setup = ObservedRobot.of("gough_stewart", "1", cameras, see=see)
+    setup = ObservedRobot.of("gough_stewart", "1", cameras, sensor=sensor)
     assert told == [o.to_dict() for o in setup.observed]
     assert [(each["leg"], each["kind"], each["camera"]) for each in told] == [
         ("1", "direction", None),
@@ -301,4 +321,4 @@ def test_every_element_is_documented() -> None:
 def test_the_help_names_every_kind(capsys: pytest.CaptureFixture[str]) -> None:
     assert execute(["derive", "--help"]) == 0
     told = " ".join(capsys.readouterr().out.split())
-    assert [kind for kind in kinds() if kind not in told[told.index("--see") :]] == []
+    assert [kind for kind in kinds() if kind not in told[told.index("--sensor") :]] == []

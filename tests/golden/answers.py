@@ -84,7 +84,7 @@ PICTURES = {
     "servo": ("servo", "delta", "--start", "x=0", "--goal", "x=0.05"),
     "servo in a plane": ("servo", "3rrr_m1", "--start", "x=0", "--goal", "x=0.03"),
     "equilibria": ("equilibria", "3rrr_m1"),
-    "basins": ("basins", "rrrrr_m1", "--to", "x=0", "--grid", "x=-0.05:0.05:5,y=0.2"),
+    "basins": ("basins", "rrrrr_m1", "--goal", "x=0", "--grid", "x=-0.05:0.05:5,y=0.2"),
     "accuracy": ("accuracy", "delta", "--cone", "0.1deg", "--plane", "z=-0.6"),
 }
 ENTRIES, SEED, PIXELS = 500, 7, 48

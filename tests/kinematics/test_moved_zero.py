@@ -139,7 +139,7 @@ def test_answers_are_those_of_the_same_robot(name: str):
 def test_the_ranges_of_motors_are_those_of_the_same_robot(name: str, tmp_path: Path):
     robot = limited(hrsynth.load(name), seed=4)
     moved = rezero(walked(PinocchioModel(robot), seed=3, steps=1, size=0.03))
-    one, two = hrsynth.branch(robot, effort=60), hrsynth.branch(moved, effort=60)
+    one, two = hrsynth.branch(robot, max_cells=60), hrsynth.branch(moved, max_cells=60)
     for part, other in zip(one.parts, two.parts, strict=True):
         assert part.motors == other.motors
         np.testing.assert_allclose(part.requested_box, other.requested_box, atol=1e-9)

@@ -19,9 +19,9 @@ from kinematics.robots import setting_of
     ("robot", "see"),
     [("quattro", ()), ("orthoglide", ()), ("3rrr_m1", ()), ("gough_stewart", ("c=point:platform@0,0,0",))],
 )
-def test_together_every_way_ends_where_it_ends_alone(robot: str, see: tuple[str, ...]) -> None:
+def test_together_every_way_ends_where_it_ends_alone(robot: str, sensor: tuple[str, ...]) -> None:
     """To the last digit, on the ways of samples; the loop here is the one that solves for a single configuration."""
-    setup = observe(robot, camera="c=base@0,0,2/180deg,0,0", see=see, samples=3) if see else setting_of(robot)
+    setup = observe(robot, camera="c=base@0,0,2/180deg,0,0", sensor=sensor, samples=3) if sensor else setting_of(robot)
     model = setup.all_samples.model
     ways = [member.way for member in setup.samples.members]
     home = setup.samples.observation_model.target(setup.all_samples.start)

@@ -205,7 +205,7 @@ class Case:
     follows: tuple[str, ...] = ()
     ending: str = ".urdf"
     robot: str = "3rrr_m1"
-    reader: str | None = None
+    program: str | None = None
     geometry: bool = True
     """Whether a mended file has the very geometry of the sound one."""
 
@@ -248,7 +248,7 @@ CASES = [
         lambda root: root.findall("transmission")[1].set("name", root.findall("transmission")[0].get("name") or ""),
     ),
     Case("link-unused", add('<link name="spare"/>'), ("refused", "guessed")),
-    Case("reader-drops", both(), reader="mujoco"),
+    Case("reader-drops", both(), program="mujoco"),
     Case("refused", put("loop", type="helical")),
     Case(
         "observe-legs",

@@ -202,7 +202,7 @@ def test_text_names_place_rule_and_mend(bad: Path):
         (["more.urdf"], 2),
         (["--ignore", "refused", "--fail-on", "note"], 1),
         (["-o", "x.urdf"], 2),
-        (["--reader", "x"], 2),
+        (["--program", "x"], 2),
     ],
 )
 def test_the_exit_status_tells(bad: Path, capsys, arguments: list[str], status: int):

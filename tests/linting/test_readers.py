@@ -110,7 +110,7 @@ def test_the_construct_of_a_file_is_recognised(name: str, tmp_path: Path):
     (found,) = [each for each in hrsynth.lint(path).findings if each.rule == "reader-drops"]
     assert f"({WRITTEN[name]}): " in found.message
     assert found.severity == "note"
-    asked = [each for each in hrsynth.lint(path, reader=["mujoco", "isaac"]).findings if each.rule == "reader-drops"]
+    asked = [each for each in hrsynth.lint(path, program=["mujoco", "isaac"]).findings if each.rule == "reader-drops"]
     programs = {each.message.split("): ")[1].split()[0] for each in asked}
     assert programs == ({"mujoco"} if name in ("loop_joint", "two joints, one child") else {"mujoco", "isaac"})
     assert {each.severity for each in asked} == {"error"}

@@ -61,14 +61,14 @@ def test_every_rule_has_a_case():
 
 
 @pytest.mark.some(3)
-@pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.rule}{case.run_outcome}")
+@pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.rule}{case.ending}")
 def test_a_rule_finds_its_defect_and_no_other(case: Case, tmp_path: Path, shelf: Path):
     _, two = files(case, tmp_path, shelf)
     _, before = sound_file(case.robot, case.ending, shelf)
-    after = rules_in(two, **{} if case.reader is None else {"reader": case.reader})
-    if case.reader is None:
+    after = rules_in(two, **{} if case.program is None else {"program": case.program})
+    if case.program is None:
         assert before[case.rule] == 0 or case.rule == "motor-unlimited"
-    assert after[case.rule] > (0 if case.reader else before[case.rule])
+    assert after[case.rule] > (0 if case.program else before[case.rule])
     new = {name for name in after if after[name] > before[name]}
     assert case.rule in new
     assert new <= {case.rule, *case.follows}
@@ -78,7 +78,7 @@ MENDED = [case for case in CASES if lint_rules()[case.rule].fixable]
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize("case", MENDED, ids=lambda case: f"{case.rule}{case.run_outcome}")
+@pytest.mark.parametrize("case", MENDED, ids=lambda case: f"{case.rule}{case.ending}")
 def test_what_is_mended_is_the_sound_file_again(case: Case, tmp_path: Path, shelf: Path):
     one, two = files(case, tmp_path, shelf)
     before = two.read_bytes()
@@ -483,7 +483,7 @@ def test_nothing_is_written_where_nothing_is_mended_or_the_request_is_wrong(tmp_
     before = path.stat().st_mtime_ns
     assert hrsynth.lint(path, fix=True).written is None
     assert path.stat().st_mtime_ns == before
-    for wrong in ({"output": tmp_path / "o.urdf"}, {"ignore": "nothing"}, {"reader": "nothing"}):
+    for wrong in ({"output": tmp_path / "o.urdf"}, {"ignore": "nothing"}, {"program": "nothing"}):
         with pytest.raises(BadRequest):
             hrsynth.lint(path, **wrong)
     with pytest.raises(BadRequest):

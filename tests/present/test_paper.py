@@ -54,9 +54,9 @@ QUESTIONS: dict[str, Callable[[str], Any]] = {
     "servo in space": lambda _: hrsynth.servo(
         "quattro", "1,4", start="x=0,y=0,z=-0.75,phi=0", goal="x=-0.2,y=0,z=-0.56,phi=0"
     ),
-    "equilibria in the plane": lambda _: hrsynth.equilibria("prrrp_m1", at="mode:1"),
+    "equilibria in the plane": lambda _: hrsynth.equilibria("prrrp_m1", goal="mode:1"),
     "basins of a plane": lambda _: hrsynth.basins(
-        "3rpr_m1", to="x=0,y=0,phi=0", grid="x=0:0.3:6,y=0:0.3:7,phi=0", jobs=1
+        "3rpr_m1", goal="x=0,y=0,phi=0", grid="x=0:0.3:6,y=0:0.3:7,phi=0", jobs=1
     ),
     "aspects": lambda _: hrsynth.aspects("quattro", "1,4"),
     "aspects with its section": lambda folder: hrsynth.aspects(six_poses(folder)),

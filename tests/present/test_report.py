@@ -372,9 +372,9 @@ def test_a_report_speaks_of_what_is_seen_whatever_kind_it_is(tmp_path: Path):
                 "1",
                 "--camera",
                 "eye=base@0.1,0.05,-0.4",
-                "--see",
+                "--sensor",
                 "point:platform@0.05,0,0",
-                "--see",
+                "--sensor",
                 "distance:platform@0,0.1,0",
                 "--report",
                 str(page),
@@ -384,7 +384,10 @@ def test_a_report_speaks_of_what_is_seen_whatever_kind_it_is(tmp_path: Path):
     )
     said = text_of(read(page.read_text(encoding="utf-8")))
     asked = legs(
-        "3rrr_m1", "eye=base@0.1,0.05,-0.4", observe="1", see=["point:platform@0.05,0,0", "distance:platform@0,0.1,0"]
+        "3rrr_m1",
+        "eye=base@0.1,0.05,-0.4",
+        observe="1",
+        sensor=["point:platform@0.05,0,0", "distance:platform@0,0.1,0"],
     )
     assert asked.minimal == (("1", "point_1"), ("point_1", "distance_1"))
     assert "Fewest observations that show 3 of 3: 1, point_1; point_1, distance_1." in said

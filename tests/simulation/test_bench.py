@@ -72,7 +72,7 @@ def test_the_other_simulated_robots_do_too(name: str):
 
 @pytest.mark.slow
 def test_the_bench_tells_how_far_it_stopped_from_there():
-    found = servo(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.05,y=0.05,z=-0.62", physics=True, gain=4)
+    found = servo(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.05,y=0.05,z=-0.62", dynamics=True, gain=4)
     assert found.outcome == "goal"
     (note,) = found.notes
     assert float(note.split("stopped ")[1].split(" mm")[0]) < 1
@@ -84,7 +84,7 @@ def test_noise_goes_through_the_bench_as_well():
         load("delta"),
         start="x=0,y=0,z=-0.6",
         goal="x=0.05,y=0.05,z=-0.62",
-        physics=True,
+        dynamics=True,
         gain=4,
         noise="0.5deg",
         time=2.0,
@@ -101,7 +101,7 @@ def test_a_robot_without_motors_has_no_bench():
 
     loose = robot.changed(joints=[replace(joint, motor=None) for joint in robot.joints.values()])
     with pytest.raises(BadRequest, match="no motor"):
-        servo(loose, start="x=0,y=0", goal="x=0.05,y=0", physics=True)
+        servo(loose, start="x=0,y=0", goal="x=0.05,y=0", dynamics=True)
 
 
 def test_a_joint_with_six_freedoms_has_no_mock_up():
@@ -114,4 +114,4 @@ def test_a_joint_with_six_freedoms_has_no_mock_up():
 def test_without_mujoco_the_bench_is_refused_in_one_line(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(__import__("sys").modules, "mujoco", None)
     with pytest.raises(MissingExtra, match=r"hrsynth\[bench\]"):
-        servo(load("delta"), start="x=0,y=0", goal="x=0.05,y=0", physics=True)
+        servo(load("delta"), start="x=0,y=0", goal="x=0.05,y=0", dynamics=True)

@@ -31,8 +31,8 @@ def test_what_a_film_does_not_draw_is_refused_before_the_run(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setattr(ServoTask, "run", lambda _: pytest.fail("it runs"))
-    see = ("point:platform@0.1,0,0", "point:platform@-0.1,0.1,0", "point:platform@0,-0.1,0")
-    told = [word for each in see for word in ("--see", each)]
+    sensor = ("point:platform@0.1,0,0", "point:platform@-0.1,0.1,0", "point:platform@0,-0.1,0")
+    told = [word for each in sensor for word in ("--sensor", each)]
     assert (
         execute(
             [

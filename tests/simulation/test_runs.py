@@ -358,7 +358,7 @@ REFUSED: list[tuple[str, Callable[[], object], type[Exception], str]] = [
     ),
     (
         "endless physics",
-        lambda: servo(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0,z=-0.6", physics=True, gain=1e-9),
+        lambda: servo(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0,z=-0.6", dynamics=True, gain=1e-9),
         BadRequest,
         "a larger gain",
     ),

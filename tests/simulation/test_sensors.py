@@ -34,13 +34,13 @@ HAND = "hand=wrist_3_link"
 ARM_GOAL = "x=0.47,y=0.08,z=0.45,rpy=3.1/0.05/0.1"
 
 
-def platform(see: tuple[str, ...] = POINTS, start: str = START, **options: object) -> Servo:
-    return hrsynth.servo("gough_stewart", camera=EYE, see=see, start=start, goal=GOAL, **options)
+def platform(sensor: tuple[str, ...] = POINTS, start: str = START, **options: object) -> Servo:
+    return hrsynth.servo("gough_stewart", camera=EYE, sensor=sensor, start=start, goal=GOAL, **options)
 
 
 def arm(start: str, corners: Array = CORNERS, **options: object) -> Servo:
-    see = [f"point:world@{x},{y},{z}" for x, y, z in corners]
-    return hrsynth.servo("example:ur5_robot", camera=HAND, see=see, start=start, goal=ARM_GOAL, **options)
+    sensor = [f"point:world@{x},{y},{z}" for x, y, z in corners]
+    return hrsynth.servo("example:ur5_robot", camera=HAND, sensor=sensor, start=start, goal=ARM_GOAL, **options)
 
 
 def picture(at: ClosedConfiguration, corners: Array = CORNERS) -> Array:
@@ -88,8 +88,8 @@ def true(found: Servo, corners: Array = CORNERS) -> bool:
     ],
     ids=["points", "lines", "circle and distance", "edges", "inclination, position and direction"],
 )
-def test_a_platform_comes_to_its_goal_with_any_sensors(see: tuple[str, ...]) -> None:
-    found = platform(see)
+def test_a_platform_comes_to_its_goal_with_any_sensors(sensor: tuple[str, ...]) -> None:
+    found = platform(sensor)
     assert found.outcome == "goal"
     X, wanted = (at.pose("platform") for at in (found.settled, found.target))
     np.testing.assert_allclose(X, wanted, atol=1e-8)
@@ -117,12 +117,12 @@ def test_a_depth_that_is_only_supposed_bends_the_way_and_may_make_the_goal_repel
 
 
 def test_a_depth_that_nothing_needs_is_refused() -> None:
-    with pytest.raises(BadRequest, match=r"--depth: .* found 'desired', allowed: none, or --see"):
+    with pytest.raises(BadRequest, match=r"--depth: .* found 'desired', allowed: none, or --sensor"):
         hrsynth.servo("delta", start="x=0", goal="x=0.05", depth="desired")
 
 
 def test_supposed_depths_make_other_rows_of_what_images_show_alone() -> None:
-    robot = hrsynth.observe("gough_stewart", camera=EYE, see=[*POINTS, "distance:platform@0.1,0,0"])
+    robot = hrsynth.observe("gough_stewart", camera=EYE, sensor=[*POINTS, "distance:platform@0.1,0,0"])
     observation_model, at = robot.samples.observation_model, robot.all_samples.start
     assert supposed_planes("exact", at, observation_model) is None
     for text in ("constant", "constant:", "constant:-1", "constant:inf", "far", ""):
@@ -154,7 +154,7 @@ def test_noise_in_pixels_needs_a_focal_length_and_keeps_the_platform_near_its_go
         platform(noise="0.3px")
     with pytest.raises(BadRequest, match="errors in lengths, found '1mm', allowed: 0"):
         platform(noise="1mm")
-    found = hrsynth.servo("gough_stewart", camera=SIZED, see=POINTS, start=START, goal=GOAL, noise="0.3px", time=4.0)
+    found = hrsynth.servo("gough_stewart", camera=SIZED, sensor=POINTS, start=START, goal=GOAL, noise="0.3px", time=4.0)
     assert found.spread is not None
     assert found.outcome == "goal"
     assert 0 < found.spread.metres < 0.02
@@ -176,9 +176,9 @@ def test_noise_in_pixels_needs_a_focal_length_and_keeps_the_platform_near_its_go
     ],
 )
 def test_noise_is_told_in_the_unit_in_which_it_is_given(
-    see: tuple[str, ...], noise: str, words: str, unit: str, most: float
+    sensor: tuple[str, ...], noise: str, words: str, unit: str, most: float
 ) -> None:
-    found = hrsynth.servo("gough_stewart", camera=SIZED, see=see, start=GOAL, goal=GOAL, noise=noise, time=0.4)
+    found = hrsynth.servo("gough_stewart", camera=SIZED, sensor=sensor, start=GOAL, goal=GOAL, noise=noise, time=0.4)
     (told,) = (each for each in found.notes if "wrong" in each)
     assert told.startswith(f"measured {words} were wrong by ")
     *_, largest, last = told.split()
@@ -188,7 +188,7 @@ def test_noise_is_told_in_the_unit_in_which_it_is_given(
 
 def test_the_picture_of_a_camera_with_a_size_is_all_of_it(recwarn: pytest.WarningsRecorder) -> None:
     """Matplotlib says so where it does not keep the limits that it is given."""
-    setup = hrsynth.observe("gough_stewart", camera=SIZED, see=POINTS)
+    setup = hrsynth.observe("gough_stewart", camera=SIZED, sensor=POINTS)
     eye = replace(next(each for each in eyes(setup) if each.name == "eye"), width=640, height=480)
     found = hrsynth.servo(setup, start=GOAL, goal=GOAL, time=0.4)
     place = Figure((6, 2)).add_axes((0.1, 0.1, 0.8, 0.8))
@@ -201,7 +201,7 @@ def test_the_picture_of_a_camera_with_a_size_is_all_of_it(recwarn: pytest.Warnin
 
 def test_what_stands_behind_the_camera_is_refused() -> None:
     with pytest.raises(BadRequest, match="not in front of its camera at the start"):
-        hrsynth.servo("gough_stewart", camera="eye=base@0,0,1", see=POINTS, start=START, goal=GOAL)
+        hrsynth.servo("gough_stewart", camera="eye=base@0,0,1", sensor=POINTS, start=START, goal=GOAL)
     for options in ({"physics": True}, {"sense": "edges"}):
         with pytest.raises(BadRequest, match="segments"):
             platform(**options)
@@ -234,9 +234,9 @@ def test_directions_are_fed_back_as_ever() -> None:
     """The same robot with its legs' directions, asked as legs and as observations of their links."""
     robot = setting("3rrr_m1")
     links = [(o.link, o.direction) for o in robot.observed]  # type: ignore[attr-defined]
-    see = [f"direction:{link}/{','.join(map(repr, map(float, axis)))}" for link, axis in links]
+    sensor = [f"direction:{link}/{','.join(map(repr, map(float, axis)))}" for link, axis in links]
     poses = {"start": "x=0,y=0,phi=0", "goal": "x=0.02,y=0,phi=0.1"}
-    one, other = hrsynth.servo("3rrr_m1", **poses), hrsynth.servo("3rrr_m1", see=see, **poses)
+    one, other = hrsynth.servo("3rrr_m1", **poses), hrsynth.servo("3rrr_m1", sensor=sensor, **poses)
     assert one.outcome == other.outcome == "goal"
     np.testing.assert_allclose(one.errors[0], other.errors[0], atol=1e-12)
 
@@ -276,10 +276,12 @@ BODY = """<robot name="body"><link name="base"/><link name="platform"/>
   <hrsynth serial="true"><platform link="platform"/></hrsynth></robot>"""
 
 
-def body(folder: Path, see: list[str], start: str, goal: str, **options: object) -> Servo:
+def body(folder: Path, sensor: list[str], start: str, goal: str, **options: object) -> Servo:
     """A run of a body that nothing holds."""
     (folder / "body.urdf").write_text(BODY)
-    return hrsynth.servo(folder / "body.urdf", start=start, goal=goal, see=see, camera="eye=base@0,0,0", **options)
+    return hrsynth.servo(
+        folder / "body.urdf", start=start, goal=goal, sensor=sensor, camera="eye=base@0,0,0", **options
+    )
 
 
 def test_a_line_that_comes_to_the_cameras_centre_ends_the_run(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from ..kinematics.sampling import Samples
 from ..mechanism import Direction, Joint, JointType, Mechanism, Observation
 from ..mechanism.observations import kinds
 from ..mechanism.sensors import encoders, observation_of, observed_line
-from ..options import WATCHING, option, plain_number
+from ..options import OBSERVATION, option, plain_number
 from ..progress import report
 from ..records import FLAT, GAP, OPTIONAL, As, Recorded, Shown, Word, recorded
 from ..results import Result, Value
@@ -52,7 +52,7 @@ class FurtherRecord(TypedDict):
     if there are none)."""
 
     kind: Kind
-    of: Annotated[str, "the leg, the link, the joint, or the words of --see"]
+    of: Annotated[str, "the leg, the link, the joint, or the words of --sensor"]
     leg: Annotated[str | None, "null: of a joint or a link inside the platform"]
     link: NotRequired[str]
     at: NotRequired[list[float] | None]
@@ -66,9 +66,8 @@ class FurtherMeasurement(Value):
 
     ``kind`` is leg (its default segment), direction (of another link), line (the position of a line whose direction is
     observed), encoder or offered (by the user); ``of`` names the leg, the link or the joint, or repeats the words of
-    ``--see`` for what is offered. An encoder says which coordinate of the joint it reads if there are two, and whether
-    a motor drives the joint.
-    """
+    ``--sensor`` for what is offered. An encoder says which coordinate of the joint it reads if there are two, and
+    whether a motor drives the joint."""
 
     kind: Kind
     of: str
@@ -95,7 +94,7 @@ class FurtherMeasurement(Value):
 
 def candidates(setup: ObservedRobot, offered: Sequence[str] = ()) -> tuple[FurtherMeasurement, ...]:
     """Everything that could be added: legs, directions of other links, positions of observed lines, encoders, and what
-    is ``offered``, in the words of ``--see``."""
+    is ``offered``, in the words of ``--sensor``."""
     more = [
         FurtherMeasurement("offered", text, each, each.leg) for text, each in zip(offered, setup.offered, strict=True)
     ]
@@ -237,9 +236,9 @@ class Advice(Result, shown_as="advise"):
     examples=(
         "uranesx",
         "quattro --observe 1",
-        "quattro --observe 1 --offer point:platform,inclination",
-        "uranesx --offer point:platform --price point=3",
-        "gough_stewart --camera eye=base@0.3,0.1,0 --see point:platform@0.1,0,0 --offer point:platform",
+        "quattro --observe 1 --candidate-sensor point:platform,inclination",
+        "uranesx --candidate-sensor point:platform --cost point=3",
+        "gough_stewart --camera eye=base@0.3,0.1,0 --sensor point:platform@0.1,0,0 --candidate-sensor point:platform",
     ),
 )
 def advise(
@@ -247,18 +246,18 @@ def advise(
     observe: LegsLike = None,
     camera: CameraLike = None,
     *,
-    see: SeeLike = None,
-    offer: Annotated[
+    sensor: SeeLike = None,
+    candidate_sensor: Annotated[
         SeeLike,
         option(
-            "What could be observed in addition, written as for --see; without a place, such as "
+            "What could be observed in addition, written as for --sensor; without a place, such as "
             "point:plate, several places of that link; separate more by commas, or repeat.",
             "[CAMERA=]KIND:LINK[@x,y,z/dx,dy,dz/radius]",
             kind=list[str],
-            group=WATCHING,
+            group=OBSERVATION,
         ),
     ] = None,
-    price: Annotated[
+    cost: Annotated[
         str,
         option(
             "Prices by kind, such as encoder=0.5,point=3 (default: 1 each); the cheapest sets are "
@@ -272,24 +271,26 @@ def advise(
     """What is missing: the smallest sets of further measurements that make a robot controllable.
 
     The cheapest sets of further measurements with which u̇ = 0 forces t = 0 (theory.md 6; MMT 5.3): the smallest,
-    unless ``price``, as ``encoder=0.5,point=3``, says what one measurement of a kind costs (default: 1).
+    unless ``cost``, as ``encoder=0.5,point=3``, says what one measurement of a kind costs (default: 1).
 
     ``observe`` holds leg labels or link names (default: what the robot observes, else all legs), ``camera`` the link
     that carries the camera.
     Candidates are the default segment of a further leg, the direction of any other link of a leg, the position of a
-    line whose direction is observed, an encoder on any joint, and what is offered (``offer``: texts as for ``see``; one
-    without a place, ``point:plate``, stands for several places of that link). Every returned set is verified at all
-    samples; at most ``most`` of the smallest are. Raises ``BadRequest`` for unknown names, ``RankUndecided`` if what is
-    seen now has no clear rank.
+    line whose direction is observed, an encoder on any joint, and what is offered (``candidate_sensor``: texts as for
+    ``sensor``; one without a place, ``point:plate``, stands for several places of that link). Every returned set is
+    verified at all samples; at most ``most`` of the smallest are. Raises ``BadRequest`` for unknown names,
+    ``RankUndecided`` if what is seen now has no clear rank.
 
     >>> hrsynth.advise("3rrr_m1", "1,2")
     <Advice: 3rrr_m1, watching 1, 2: partially controllable, 15 sets of 1 more>
     """
     robot = as_robot(robot)
     length = (robot if isinstance(robot, Mechanism) else robot.robot).length
-    offered = [each for text in as_texts(offer) for one in split_offers(text) for each in offers(one, length)]
-    setup = ObservedRobot.of(robot, observe, camera, see=see, offer=offered or None, seed=seed)
-    prices = _prices(price)
+    offered = [
+        each for text in as_texts(candidate_sensor) for one in split_offers(text) for each in offers(one, length)
+    ]
+    setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, candidate_sensor=offered or None, seed=seed)
+    prices = _prices(cost)
     now = verdict_of(setup, setup.labels, setup.samples)
     if now.verdict in (CONTROLLABLE, AT_REST):
         return Advice(setup, now, (), 0, True)
@@ -322,15 +323,15 @@ def _prices(text: str) -> dict[str, float]:
     for part in filter(None, text.split(",")):
         kind, _, number = part.partition("=")
         if kind not in allowed:
-            raise BadRequest("--price: kind of measurement", kind, ", ".join(allowed))
+            raise BadRequest("--cost: kind of measurement", kind, ", ".join(allowed))
         if kind in found:
-            raise BadRequest("--price: a kind given twice", text, f"one price of {kind}")
+            raise BadRequest("--cost: a kind given twice", text, f"one price of {kind}")
         try:
             found[kind] = plain_number(number)
         except ValueError:
             found[kind] = np.nan
         if not 0 < found[kind] < np.inf:
-            raise BadRequest(f"--price of {kind}", number, "a positive number, as point=3")
+            raise BadRequest(f"--cost of {kind}", number, "a positive number, as point=3")
     return found
 
 
@@ -339,11 +340,11 @@ def _verify(
 ) -> list[SensorSuggestion]:
     """Each set with its price and its verdict at all samples; those whose rank has no clear gap are left out."""
     found = list[SensorSuggestion]()
-    for added, price in sets:
+    for added, cost in sets:
         watched = (*setup.observed, *(each.observation for each in added))
         try:
             verdict = verdict_of(setup, setup.labels, restrict_samples(samples, watched, ways=False))
-            found.append(SensorSuggestion(added, verdict, price))
+            found.append(SensorSuggestion(added, verdict, cost))
         except RankUndecided:
             continue
     return found

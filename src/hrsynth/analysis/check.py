@@ -212,7 +212,7 @@ def check(
     observe: LegsLike = None,
     camera: CameraLike = None,
     *,
-    see: SeeLike = None,
+    sensor: SeeLike = None,
     at: Annotated[
         PoseLike | Iterable[PoseLike],
         option(f"A pose, such as x=0.02,y=0.1,z=-0.7,phi=10deg; {POSES}", "POSE", kind=list[str]),
@@ -248,9 +248,13 @@ def check(
     poses = asked_poses(at)
     cells = None if grid is None else Grid.parse(grid)
     try:
-        setup = ObservedRobot.of(robot, observe, camera, see=see, seed=seed).telling(poses)
+        setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed).telling(poses)
     except (NoPlatform, NoSegment, BadMechanism, NotSampled) as error:
-        if not isinstance(robot, Mechanism) or poses or any(each is not None for each in (cells, observe, camera, see)):
+        if (
+            not isinstance(robot, Mechanism)
+            or poses
+            or any(each is not None for each in (cells, observe, camera, sensor))
+        ):
             raise
         return LoopCheck.of(robot, str(error).removeprefix(f"{robot.file or robot.name}: "))
     examiner = ConfigurationAnalysis.of(setup)

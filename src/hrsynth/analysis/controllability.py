@@ -123,7 +123,7 @@ def _smallest(labels: tuple[str, ...], rank: Callable[[tuple[str, ...]], int]) -
         "quattro",
         "quattro --observe arm_1,arm_2,rod_3a",
         "quattro --camera platform",
-        "delta --observe 1,2 --see inclination:rod_1a",
+        "delta --observe 1,2 --sensor inclination:rod_1a",
     ),
     formations=True,
 )
@@ -132,7 +132,7 @@ def legs(
     camera: CameraLike = None,
     *,
     observe: LegsLike = None,
-    see: SeeLike = None,
+    sensor: SeeLike = None,
     at: BeginPose = None,
     seed: Seed = 0,
 ) -> Legs:
@@ -140,12 +140,12 @@ def legs(
 
     The verdict of every set of legs (theory.md 6), on the branch of the zero configuration or of the pose ``at``
     (``mode:2``: a mode with all legs watched): of all legs at their default segments, or of the labels or links in
-    ``observe``, together with what is seen with ``see``; observations count one by one.
+    ``observe``, together with what is seen with ``sensor``; observations count one by one.
 
     >>> hrsynth.legs("3rrr_m1").minimal
     (('1', '2', '3'),)
     """
-    setup = observed(robot, observe, camera, see=see, at=at, seed=seed)
+    setup = observed(robot, observe, camera, sensor=sensor, at=at, seed=seed)
     decomposition = setup.decomposition
     whole = observe is None and all(each.by_segment for each in setup.observed)
     segments = setup.all_legs if whole else setup.observed

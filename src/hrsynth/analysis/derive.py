@@ -169,7 +169,7 @@ def derive(
     observe: LegsLike = None,
     camera: CameraLike = None,
     *,
-    see: SeeLike = None,
+    sensor: SeeLike = None,
     at: BeginPose = None,
     form: Annotated[
         str,
@@ -184,7 +184,7 @@ def derive(
     5).
 
     ``observe`` holds leg labels or link names (default: what the robot observes, else all legs); ``camera`` names the
-    link that carries the camera (default: the base), or further cameras, and ``see`` says what these see
+    link that carries the camera (default: the base), or further cameras, and ``sensor`` says what these see
     (:func:`hrsynth.observe`); ``at`` is a pose that replaces the zero configuration, in another operation mode if
     necessary, or one of its modes (``mode:2``); an observed robot already has all of that. ``form`` is ``simplified``
     or ``general``; ``unchecked``: also give the form of unchecked rules. Raises ``BadRequest`` for unknown names,
@@ -198,7 +198,7 @@ def derive(
     """
     if form not in FORMS:
         raise BadRequest("unknown form", form, tuple(FORMS))
-    setup = observed_robot(robot, observe, camera, see=see, at=at, seed=seed)
+    setup = observed_robot(robot, observe, camera, sensor=sensor, at=at, seed=seed)
     decomposition, samples = setup.decomposition, setup.samples
     verdict = verdict_of(setup, setup.labels, samples)
     exact = exact_architecture(setup).verdict(setup.observed)

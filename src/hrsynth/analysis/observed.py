@@ -30,7 +30,7 @@ from ..mechanism.observation import ObservationRecord, labels_of
 from ..mechanism.observations.direction import Direction
 from ..mechanism.pose import RADIANS, AskedPose, Pose, PoseForm, PoseLike
 from ..mechanism.sensors import default_observation, defaults_of, encoders, observation_of, reason
-from ..options import WATCHING, option
+from ..options import OBSERVATION, option
 from ..progress import report
 from ..records import As, Record, Recorded, Shown
 from ..results import Value, content
@@ -48,9 +48,9 @@ UNLIMITED = "joints whose limits are not looked at, as they are parts of other j
 LegsLike = Annotated[
     str | int | Iterable[str | int] | None,
     option(
-        "Legs to watch (1,4), links, or all (default: what the file observes, else all; none with --see).",
+        "Legs to watch (1,4), links, or all (default: what the file observes, else all; none with --sensor).",
         "LEGS",
-        group=WATCHING,
+        group=OBSERVATION,
     ),
 ]
 """Legs by their labels, or links, as a user gives them: one, several, a text with commas, ``all``; None: all."""
@@ -120,24 +120,24 @@ class ObservedRobot(Value):
         observe: LegsLike = None,
         camera: CameraLike = None,
         *,
-        see: SeeLike = None,
-        offer: SeeLike = None,
+        sensor: SeeLike = None,
+        candidate_sensor: SeeLike = None,
         samples: int = SAMPLES,
         seed: int = 0,
         driven: bool = False,
         blind: bool = False,
     ) -> ObservedRobot:
         """What a question is asked of: an observed robot itself, or a robot with what is watched of it, as
-        :func:`.asked.observe`, and in the manner of ``see`` what is ``offer``-ed besides. A question about ``driven``
-        motors needs no segments: where there are none, the motors' coordinates are observed; where it can be ``blind``,
-        and there are none of either, nothing."""
+        :func:`.asked.observe`, and in the manner of ``sensor`` what is ``candidate_sensor``-ed besides. A question
+        about ``driven`` motors needs no segments: where there are none, the motors' coordinates are observed; where it
+        can be ``blind``, and there are none of either, nothing."""
         robot = as_robot(robot)
-        names = legs_asked(robot, observe, see)
+        names = legs_asked(robot, observe, sensor)
         if isinstance(robot, ObservedRobot):
-            if (observe, camera, see, offer) != (None,) * 4:
+            if (observe, camera, sensor, candidate_sensor) != (None,) * 4:
                 raise BadRequest(
                     f"{robot.headline()}: what is watched is given twice",
-                    observe or camera or see or offer,
+                    observe or camera or sensor or candidate_sensor,
                     "nothing besides an observed robot",
                 )
             return robot
@@ -149,8 +149,8 @@ class ObservedRobot(Value):
                 (robot.file, robot.notes),
                 names,
                 as_texts(camera),
-                as_texts(see),
-                as_texts(offer),
+                as_texts(sensor),
+                as_texts(candidate_sensor),
                 samples,
                 seed,
                 driven or (blind and any(joint.actuated for joint in robot.joints.values())),
@@ -365,7 +365,7 @@ CameraLike = Annotated[
         "(metres; radians or deg; focal length, width and height in pixels); repeat for more.",
         "LINK|NAME=LINK@x,y,z/r,p,y/f,w,h",
         kind=list[str],
-        group=WATCHING,
+        group=OBSERVATION,
     ),
 ]
 """The link that carries the camera, or ``NAME=LINK@x,y,z/r,p,y``, or several of them."""
@@ -377,7 +377,7 @@ SeeLike = Annotated[
         "needs them (world: the base; for an encoder, its joint); repeat for more.",
         "[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius",
         kind=list[str],
-        group=WATCHING,
+        group=OBSERVATION,
     ),
 ]
 """``[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius``, or several of them."""
@@ -393,7 +393,6 @@ StartPose = Annotated[
     option(
         "Start pose, such as x=0.02,y=0.1,z=-0.7; mode:2 is a mode with the directions at the goal.",
         "POSE",
-        old=("--from",),
     ),
 ]
 NoiseLike = Annotated[
@@ -411,8 +410,8 @@ POSES = (
     "(default: the zero configuration)."
 )
 POINTS = (
-    "--camera eye=base@0.3,0.1,0 --see point:platform@0.1,0,0 --see point:platform@-0.1,0.1,0 "
-    "--see point:platform@0,0.1,0.1"
+    "--camera eye=base@0.3,0.1,0 --sensor point:platform@0.1,0,0 --sensor point:platform@-0.1,0.1,0 "
+    "--sensor point:platform@0,0.1,0.1"
 )
 """Three image points by a camera beside the robot: an example."""
 RobotLike = Mechanism | ObservedRobot | str | Path
@@ -448,10 +447,10 @@ def as_names(given: LegsLike) -> tuple[str, ...] | None:
     return tuple(str(each).strip() for each in every)
 
 
-def legs_asked(robot: Mechanism | ObservedRobot, observe: LegsLike, see: SeeLike = None) -> tuple[str, ...] | None:
+def legs_asked(robot: Mechanism | ObservedRobot, observe: LegsLike, sensor: SeeLike = None) -> tuple[str, ...] | None:
     """:func:`as_names`, None also for all legs where nothing but segments is watched: one question, told in one way."""
     names = as_names(observe)
-    other = see is not None or (isinstance(robot, Mechanism) and bool(robot.observations))
+    other = sensor is not None or (isinstance(robot, Mechanism) and bool(robot.observations))
     return None if names == ("all",) and not other else names
 
 
@@ -480,8 +479,8 @@ def _observed_robot(
     source: Hashable,
     observe: tuple[str, ...] | None,
     cameras: tuple[str, ...],
-    see: tuple[str, ...],
-    offer: tuple[str, ...],
+    sensor: tuple[str, ...],
+    candidate_sensor: tuple[str, ...],
     samples: int,
     seed: int,
     driven: bool,
@@ -489,7 +488,7 @@ def _observed_robot(
 ) -> ObservedRobot:
     """The answer to the same words for the same value of a robot, of one ``source``, is the same value: it is drawn
     once."""
-    robot, asked, possible = _seeing(robot, cameras, see, offer)
+    robot, asked, possible = _seeing(robot, cameras, sensor, candidate_sensor)
     normal = normal_form(robot)
     decomposition = decompose(normal.mechanism)
     defaults = defaults_of(decomposition)
@@ -526,7 +525,7 @@ def _observed_robot(
 
 
 def _seeing(
-    robot: Mechanism, cameras: tuple[str, ...], see: tuple[str, ...], offer: tuple[str, ...]
+    robot: Mechanism, cameras: tuple[str, ...], sensor: tuple[str, ...], candidate_sensor: tuple[str, ...]
 ) -> tuple[Mechanism, set[str], set[str]]:
     """The robot with cameras and observations that are asked for and offered, and the labels of these."""
     named = [parse_camera(text) for text in cameras if "=" in text]
@@ -538,7 +537,7 @@ def _seeing(
             raise BadRequest(f"{robot.name} has no link for the camera", link, sorted(robot.links))
         robot = replace(robot, camera=link)
     eyes = [each.name for each in named or robot.cameras]
-    every = [("--see", text) for text in see] + [("--offer", text) for text in offer]
+    every = [("--sensor", text) for text in sensor] + [("--candidate-sensor", text) for text in candidate_sensor]
     specs = [_spec(flag, text, eyes) for flag, text in every]
     used = {each.camera for each in specs} & set(eyes)
     for camera in named:
@@ -546,7 +545,7 @@ def _seeing(
             raise BadRequest(
                 f"{robot.name}: a camera to which nothing is given to see",
                 camera.name,
-                f"--see {camera.name}=KIND:LINK… with it, where a command has that option; --camera LINK "
+                f"--sensor {camera.name}=KIND:LINK… with it, where a command has that option; --camera LINK "
                 "for the camera that watches legs",
             )
     robot = with_sights(robot, (), named)
@@ -557,14 +556,14 @@ def _seeing(
         except BadRequest as error:
             raise BadRequest(f"{flag} {text}: {error.what}", error.value, error.allowed) from None
         labels.append({o.leg for o in robot.observations}.difference(*labels))
-    return robot, set().union(*labels[1 : len(see) + 1]), set().union(*labels[len(see) + 1 :])
+    return robot, set().union(*labels[1 : len(sensor) + 1]), set().union(*labels[len(sensor) + 1 :])
 
 
 def _spec(option: str, text: str, eyes: Sequence[str]) -> ObservationSpec:
     try:
         return parse_see(text, eyes)
     except BadRequest as error:
-        raise BadRequest(error.what.replace("--see", option, 1), error.value, error.allowed) from None
+        raise BadRequest(error.what.replace("--sensor", option, 1), error.value, error.allowed) from None
 
 
 def _observations(

@@ -29,7 +29,7 @@ def observe(
     legs: LegsLike = None,
     camera: CameraLike = None,
     *,
-    see: SeeLike = None,
+    sensor: SeeLike = None,
     at: PoseLike | None = None,
     samples: int = SAMPLES,
     seed: int = 0,
@@ -40,7 +40,7 @@ def observe(
     ``legs`` holds leg labels or link names (in a string, separated by commas); ``["all"]`` means all legs, None
     what the robot itself observes, else all legs at their default segments. ``camera`` names the link that carries
     the camera; ``NAME=LINK@x,y,z/r,p,y`` is a further, named one, in the link's frame (x right, y down, z ahead;
-    metres, radians or ``deg``). ``see`` holds other observations, ``[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius``
+    metres, radians or ``deg``). ``sensor`` holds other observations, ``[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius``
     (:mod:`hrsynth.mechanism.observations`), which replace all legs if ``legs`` is None. ``at`` is a pose that
     replaces the zero configuration: on the same branch if that reaches the pose, otherwise in another operation
     mode that was met; coordinates of joints or motors (``motors:0.1,0.2``); or a mode of the zero configuration with
@@ -57,7 +57,7 @@ def observe(
     robot = as_robot(robot)
     require_range("seed", seed, "an integer", 0)
     if at is None:
-        return ObservedRobot.of(robot, legs, camera, see=see, samples=samples, seed=seed)
+        return ObservedRobot.of(robot, legs, camera, sensor=sensor, samples=samples, seed=seed)
     if isinstance(robot, ObservedRobot):
         raise BadRequest(
             f"{robot.headline()}: what is watched is given twice", str(at), "nothing besides an observed robot"
@@ -67,8 +67,10 @@ def observe(
     if isinstance(asked, Pose):
         start = _start_at(ObservedRobot.of(robot, seed=seed), asked)
     else:
-        (start,) = configurations_at(ObservedRobot.of(robot, legs, camera, see=see, seed=seed), [asked])
-    return ObservedRobot.of(replace(rezero(start), file=robot.file), legs, camera, see=see, samples=samples, seed=seed)
+        (start,) = configurations_at(ObservedRobot.of(robot, legs, camera, sensor=sensor, seed=seed), [asked])
+    return ObservedRobot.of(
+        replace(rezero(start), file=robot.file), legs, camera, sensor=sensor, samples=samples, seed=seed
+    )
 
 
 def require_platform(robot: Mechanism, where: object) -> None:

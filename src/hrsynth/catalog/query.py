@@ -85,14 +85,13 @@ class Catalog(Value):
         """The records that fit all given criteria (those that are not None); raises ``BadRequest`` for unknown ones.
 
         ``group``, ``dof``, ``motion`` ("3T", "2T1R"), ``verdict``, ``base_motors``, ``fewest`` (legs of the smallest
-        set that sees all that can be seen), ``modes`` (complex ones of such a set) and ``see`` ("3point": what is seen
-        of the platform instead of legs) must be equal. ``legs`` is their number, or a pattern of ``*`` and ``?`` for
-        the notation or for the chain of one leg, with or without motor marks. ``motors`` ("R", "P", "P+R" …) are the
-        kinds of all driven joints, and ``driven`` says whether the motors determine all freedoms; of a published robot
-        its first choice of motors that does counts. ``parallelograms``: whether a leg has one, or two equal rods.
-        ``text`` must occur in some field, or in
-        a name under which the robot is known. Several values in a tuple: any of them.
-        """
+        set that sees all that can be seen), ``modes`` (complex ones of such a set) and ``sensor`` ("3point": what is
+        seen of the platform instead of legs) must be equal. ``legs`` is their number, or a pattern of ``*`` and ``?``
+        for the notation or for the chain of one leg, with or without motor marks. ``motors`` ("R", "P", "P+R" …) are
+        the kinds of all driven joints, and ``driven`` says whether the motors determine all freedoms; of a published
+        robot its first choice of motors that does counts. ``parallelograms``: whether a leg has one, or two equal rods.
+        ``text`` must occur in some field, or in a name under which the robot is known. Several values in a tuple: any
+        of them."""
         require_askable(asked)
         if isinstance(self.records, ReadRecords):
             return Catalog(self.records.fitting(asked))
@@ -126,10 +125,9 @@ def load(path: str | Path | None = None, **asked: Any) -> Catalog:
     """The shipped catalog, or that of a folder or SQLite file; ``published``: the shipped one of published robots
     (studies/parroblib); ``all``: both. ``asked`` as for ``Catalog.where``.
 
-    What is seen of platforms instead of legs (the group ``sensors``) is left out unless ``group`` or ``see`` asks for
-    it. Of a SQLite file only the records that fit are read. Raises ``BadRequest`` if there is no catalog, or one of
-    another version.
-    """
+    What is seen of platforms instead of legs (the group ``sensors``) is left out unless ``group`` or ``sensor`` asks
+    for it. Of a SQLite file only the records that fit are read. Raises ``BadRequest`` if there is no catalog, or one of
+    another version."""
     require_askable(asked)
     kept = _there(path)
     groups = _groups(kept, asked)

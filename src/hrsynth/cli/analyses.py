@@ -97,9 +97,6 @@ class Question:
         motors = mechanism.proposed_motors if self.name in ("derive", "check") else None
         if motors is not None and motors not in getattr(found, "more", ()):
             warn(motors)
-        for declared in options(self.name):
-            if declared.deprecated and values.get(declared.name) is not None:
-                warn(f"{declared.names[0]} is deprecated, {declared.deprecated}")
         found.require_answered(**values)
 
     def _given_options(self, function: Callable[..., Any], values: dict[str, Any]) -> dict[str, Any]:

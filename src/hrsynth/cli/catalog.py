@@ -111,7 +111,7 @@ class Entry(TypedDict, total=False):
     motor_rank: int
     motors: int
     rank: int
-    see: Annotated[str, "what is seen of the platform instead of legs"]
+    sensor: Annotated[str, "what is seen of the platform instead of legs"]
     steps: list[str]
     verdict: Word
     attempt: int | None

@@ -10,13 +10,12 @@ from itertools import takewhile
 from typing import Any
 
 from ..errors import BadRequest
-from ..options import NEEDED, OUTPUT, OWN, READING, WATCHING, Option
+from ..options import NEEDED, OBSERVATION, OUTPUT, OVERRIDES, OWN, Option
 from .colour import paint_help, say
-from .options import warn
 
 HELP = ("-h", "--help")
 HELP_ROW = (", ".join(HELP), "Show this message and exit.")
-POSES = ("--at", "--to", "--goal")
+POSES = ("--at", "--goal")
 """What the pose of a question is called: where the robot is, where runs should end, where one way leads."""
 LIKE_A_FLAG = 0.7
 """How much alike a word and an option are of which it may be a misspelling."""
@@ -49,8 +48,7 @@ class DeclaredCommand:
             self.run(**values)
 
     def values(self, words: Sequence[str], beside: Sequence[DeclaredCommand] = ()) -> dict[str, Any] | None:
-        """The value of each option by its name, None where help is asked for; what is called by an old name is told.
-        Raises ``BadRequest``.
+        """The value of each option by its name, None where help is requested. Raises ``BadRequest``.
 
         Options stand anywhere before ``--``, as ``--name VALUE``, ``--name=VALUE``, ``-n VALUE``, ``-n=VALUE`` or
         ``-nVALUE``.
@@ -60,7 +58,7 @@ class DeclaredCommand:
         flags = {
             name: (each, told)
             for each in self.options
-            for names in (*each.names, *each.old)
+            for names in each.names
             for name, told in zip(names.split("/"), (True, False), strict=False)
         }
         parser = ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False, argument_default=SUPPRESS)
@@ -95,9 +93,6 @@ class DeclaredCommand:
                 name,
                 get_close_matches(name, flags, cutoff=LIKE_A_FLAG) or sorted(flags),
             )
-        for name in (word.partition("=")[0] for word in joined):
-            if name in flags and name in flags[name][0].old:
-                warn(f"{name} is now called {flags[name][0].names[0]}; the old name will be removed in 0.4")
         given: dict[str, list[Any]] = vars(found)
         plain += rest
         for option in self.options:
@@ -131,7 +126,7 @@ class DeclaredCommand:
             *_head(self.path, [*(each.value for each in arguments), *needed, "[OPTIONS]"], self.help),
             *_section("Arguments", [(each.value, each.told) for each in arguments]),
         ]
-        for group in (OWN, WATCHING, OUTPUT, READING):
+        for group in (OWN, OBSERVATION, OUTPUT, OVERRIDES):
             rows = [(each.shown, each.told) for each in self.options if each.group == group and not each.argument]
             parts += _section(group, rows + [HELP_ROW] * (group == OUTPUT))
         return "\n\n".join([*parts, *_examples(self.path, self.examples)])

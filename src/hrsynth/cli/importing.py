@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..characters import escape_steering
-from ..options import NEEDED, WATCHING, Option, flag, output
+from ..options import NEEDED, OBSERVATION, Option, flag, output
 from ..records import OfRobot
 from .colour import say
 from .commands import Group, add_command
@@ -431,7 +431,7 @@ def add(app: Group) -> None:
         "does the same without questions. With --yes, or without a terminal, it accepts and reports guesses.",
         (
             *SOURCE,
-            Option("observe", "Links to watch, at their default segments.", "LINKS", group=WATCHING),
+            Option("observe", "Links to watch, at their default segments.", "LINKS", group=OBSERVATION),
             flag("yes", "Ask no questions: accept the guesses."),
             flag("view", "Show the robot in the browser before the questions."),
             Option(

@@ -34,7 +34,7 @@ def lint(
     format: str,
     fail_on: str,
     json: bool,
-    reader: list[str] | None,
+    program: list[str] | None,
     ignore: list[str] | None,
     **given: Any,
 ) -> None:
@@ -52,7 +52,7 @@ def lint(
         raise BadRequest("--json together with --format", format, "one of them")
     with Progress():
         given["close"] = given["close"] or ()
-        found = hrsynth.lint(files, reader=reader or (), ignore=ignore or (), **given)
+        found = hrsynth.lint(files, program=program or (), ignore=ignore or (), **given)
     if json or format == "json":
         say(record("lint", None, found.to_dict()))
     elif format == "text":
@@ -86,7 +86,7 @@ def add(app: Group) -> None:
             flag("fix", "Mend what can be mended in one way only, and overwrite the file or write to --output."),
             Option("compare", "Another file of the same robot: where the two differ.", "OTHER"),
             Option(
-                "reader",
+                "program",
                 "A program that should read the file (mujoco, gazebo …): a closure that it loses is "
                 "an error; repeat for more.",
                 "NAME",
@@ -117,6 +117,6 @@ def add(app: Group) -> None:
             "robot.urdf",
             "robot.urdf --fix -o mended.urdf",
             "robot.urdf --compare robot.xml",
-            "a.urdf b.xml --reader mujoco --format github --fail-on warning",
+            "a.urdf b.xml --program mujoco --format github --fail-on warning",
         ),
     )

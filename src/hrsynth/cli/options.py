@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from ..options import NEEDED, OUTPUT, READING, Option, flag
+from ..options import NEEDED, OUTPUT, OVERRIDES, Option, flag
 from .colour import say
 
 if TYPE_CHECKING:
@@ -31,25 +31,29 @@ SOURCE = (
         argument=True,
         words=shipped_names,
     ),
-    Option("base", "Consider only what lies between this link and the platform.", "LINK", group=READING),
-    Option("platform", "The platform, if the file names none.", "LINK", group=READING),
-    Option("motors", "The driven joints, if the file names none.", "JOINTS", group=READING),
+    Option("base", "Consider only what lies between this link and the platform.", "LINK", group=OVERRIDES),
+    Option("platform", "The platform, if the file names none.", "LINK", group=OVERRIDES),
+    Option("motors", "The driven joints, if the file names none.", "JOINTS", group=OVERRIDES),
     Option(
         "close",
         "A closure: the frames of two links, or points A@x,y,z in them, meet (default: in a point); repeat for more.",
         "A:B[:TYPE]",
         kind=list[str],
-        group=READING,
+        group=OVERRIDES,
     ),
-    Option("freeze", "Joints to hold at zero.", "JOINTS", default="", group=READING),
+    Option("freeze", "Joints to hold at zero.", "JOINTS", default="", group=OVERRIDES),
     Option(
         "keyframe",
         "Zero pose: a named posture of the file, or of an SRDF file next to it; or FILE.srdf:NAME.",
         "NAME",
-        group=READING,
+        group=OVERRIDES,
     ),
     Option(
-        "unit", "The unit of the file's lengths: m, mm, cm or in.", "UNIT", group=READING, words=("m", "mm", "cm", "in")
+        "unit",
+        "The unit of the file's lengths: m, mm, cm or in.",
+        "UNIT",
+        group=OVERRIDES,
+        words=("m", "mm", "cm", "in"),
     ),
     Option(
         "tolerance",
@@ -57,12 +61,12 @@ SOURCE = (
         "(characteristic lengths, radians; default: from the digits of the file's numbers).",
         None,
         float,
-        group=READING,
+        group=OVERRIDES,
     ),
     flag(
         "as_written",
         "Take the file's numbers as they are: do not correct what is parallel, or meets, up to rounding.",
-        READING,
+        OVERRIDES,
     ),
 )
 """A robot as the command line names it, with what its file does not say."""

@@ -6,7 +6,7 @@ import signal
 import threading
 from typing import TYPE_CHECKING, Any
 
-from ..options import WATCHING, Option
+from ..options import OBSERVATION, Option
 from .colour import say
 from .commands import Group, add_command
 from .options import shipped_names, split_names
@@ -59,8 +59,8 @@ def add(app: Group) -> None:
                 argument=True,
                 words=shipped_names,
             ),
-            Option("observe", "Legs to watch (1,4), links, or all (default: all).", "LEGS", group=WATCHING),
-            Option("camera", "The link that carries the camera.", "LINK", group=WATCHING),
+            Option("observe", "Legs to watch (1,4), links, or all (default: all).", "LEGS", group=OBSERVATION),
+            Option("camera", "The link that carries the camera.", "LINK", group=OBSERVATION),
             PORT,
             Option("browser", "Open the page in the browser.", None, bool, True, ("--browser/--no-browser",)),
         ),

@@ -121,7 +121,7 @@ def export(
     *,
     observe: LegsLike = None,
     camera: CameraLike = None,
-    effort: Cells = BRANCH_CELLS,
+    max_cells: Cells = BRANCH_CELLS,
 ) -> ExportedCode:
     """Code for a controller: motors to passive joints and platform, Jacobians, and back, on the branch of the zero
     configuration.
@@ -130,7 +130,7 @@ def export(
     it computes the passive joints and the platform's pose on the branch of the zero configuration, their Jacobians, the
     motors for a pose, and the interaction matrix of the watched directions (``observe``, ``camera`` as for ``derive``).
 
-    It answers where :func:`.branch` proves the branch (``box``, ``effort`` as there) and refuses elsewhere. The same
+    It answers where :func:`.branch` proves the branch (``box``, ``max_cells`` as there) and refuses elsewhere. The same
     robot gives the same text on one machine. Raises what ``branch`` raises, ``NothingProved``, ``BadRequest`` for
     another language.
 
@@ -141,14 +141,14 @@ def export(
         raise BadRequest("language", lang, tuple(TEMPLATES))
     given = as_robot(robot)
     watched = _watched_directions(given, observe, camera)
-    proof = branch(given, box, effort=effort)
+    proof = branch(given, box, max_cells=max_cells)
     if not proof.parts:
         raise BadRequest(f"{proof.robot.name}: loops that its motors move", 0, "one or more")
     report("code")
     branch_ = TubedBranch.of(proof, parsed_box(box))
     moved = proof.robot not in (given, getattr(given, "robot", None))
     source = Source.of(branch_, watched, closed_inverse(proof.robot if moved else given, proof, branch_))
-    code = program(source, lang, _describe_program(proof, source, lang, box, effort, as_texts(camera)))
+    code = program(source, lang, _describe_program(proof, source, lang, box, max_cells, as_texts(camera)))
     return ExportedCode(
         proof,
         lang,
@@ -194,7 +194,7 @@ def _free(proof: BranchProof, branch_: TubedBranch) -> tuple[FreeMotor, ...]:
 
 
 def _describe_program(
-    proof: BranchProof, source: Source, lang: str, box: BoxLike | None, effort: int, camera: tuple[str, ...]
+    proof: BranchProof, source: Source, lang: str, box: BoxLike | None, max_cells: int, camera: tuple[str, ...]
 ) -> list[str]:
     """What the program says of itself."""
     from ..version import __version__
@@ -211,7 +211,7 @@ def _describe_program(
             ("observe", legs),
             *(("camera", each) for each in camera),
             ("box", asked),
-            ("effort", "" if effort == BRANCH_CELLS else str(effort)),
+            ("max-cells", "" if max_cells == BRANCH_CELLS else str(max_cells)),
         )
         if value
         for word in (f"--{name}", value)

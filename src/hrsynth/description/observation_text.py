@@ -122,11 +122,11 @@ def _eye(mechanism: Mechanism, seen: Observation) -> str | None:
 
 
 def parse_see(text: str, cameras: Sequence[str]) -> ObservationSpec:
-    """What a word of ``--see`` says; without a name, of the one camera in ``cameras`` where there is one."""
+    """What a word of ``--sensor`` says; without a name, of the one camera in ``cameras`` where there is one."""
     head, given, place = text.partition(":")
     camera, named, kind = head.rpartition("=")
     if not given or (named and not camera.strip()):
-        raise BadRequest(*(("--see", text) if not given else (f"--see {text}: the camera's name", camera)), SEE)
+        raise BadRequest(*(("--sensor", text) if not given else (f"--sensor {text}: the camera's name", camera)), SEE)
     needs = _needs(kind)
     # names of links and joints may have slashes: numbers follow the last @, or have commas
     if "at" in needs:
@@ -138,34 +138,36 @@ def parse_see(text: str, cameras: Sequence[str]) -> ObservationSpec:
         if where := re.search("@([^@/]*,[^@/]*)$", link):
             form = f"{head}:{'JOINT' if 'joint' in needs else 'LINK'}"
             raise BadRequest(
-                f"--see {text}: a place, of which the kind {kind} has none",
+                f"--sensor {text}: a place, of which the kind {kind} has none",
                 where[1],
                 form + "/dx,dy,dz" * ("axis" in needs) + "[/dx,dy,dz]" * ("axis?" in needs),
             )
     attributes = {"kind": kind, "joint" if "joint" in needs else "link": link or at}
     if "at" in needs:
         if not link:
-            raise BadRequest(f"--see {text}: where on the link", at, SEE)
-        attributes["at"] = _numbers(at, f"--see {text}")
+            raise BadRequest(f"--sensor {text}: where on the link", at, SEE)
+        attributes["at"] = _numbers(at, f"--sensor {text}")
     for name in ("axis", "radius"):
         if more and (name in needs or f"{name}?" in needs):
-            attributes[name] = _numbers(more.pop(0), f"--see {text}")
+            attributes[name] = _numbers(more.pop(0), f"--sensor {text}")
     if more:
-        raise BadRequest(f"--see {text}: more than the kind needs", "/".join(more), ", ".join(needs) or "nothing more")
+        raise BadRequest(
+            f"--sensor {text}: more than the kind needs", "/".join(more), ", ".join(needs) or "nothing more"
+        )
     by_camera = issubclass(kinds()[kind], CameraObservation)
     if by_camera and not camera and len(set(cameras)) > 1:
-        raise BadRequest(f"--see {text}: by which camera", None, ", ".join(f"{name}={text}" for name in cameras))
+        raise BadRequest(f"--sensor {text}: by which camera", None, ", ".join(f"{name}={text}" for name in cameras))
     camera = camera or (cameras[0] if by_camera and cameras else "")
     try:
         found = spec_of(attributes | ({"camera": camera} if camera else {}))
     except BadRequest as error:
-        raise BadRequest(f"--see {text}: {error.what}", error.value, error.allowed or SEE) from None
+        raise BadRequest(f"--sensor {text}: {error.what}", error.value, error.allowed or SEE) from None
     return found
 
 
 def split_offers(text: str) -> list[str]:
-    """The words of an ``--offer`` with commas between them, as point:platform,inclination: a kind alone is of the link
-    before it; commas between numbers part nothing."""
+    """The words of an ``--candidate-sensor`` with commas between them, as point:platform,inclination: a kind alone is
+    of the link before it; commas between numbers part nothing."""
     found: list[str] = []
     for part in re.split(rf",(?=(?:[^,:=@/]+=)?(?:{'|'.join(kinds())})(?:[:,]|$))", text):
         link = re.sub("/[^/]*,[^/]*$", "", found[-1].partition(":")[2].partition("@")[0]) if found else ""
@@ -174,13 +176,15 @@ def split_offers(text: str) -> list[str]:
 
 
 def offers(text: str, length: float) -> list[str]:
-    """The words of ``--see`` that are offered by one of ``--offer``: itself, or where it names a link and no place on
-    it, several places, for a characteristic ``length`` (m); raises ``BadRequest``."""
+    """The words of ``--sensor`` that are offered by one of ``--candidate-sensor``: itself, or where it names a link and
+    no place on it, several places, for a characteristic ``length`` (m); raises ``BadRequest``."""
     head, _, place = text.partition(":")
     kind = head.rpartition("=")[2]
     needs = kinds()[kind].needs if kind in kinds() else ()
     if "joint" in needs:
-        raise BadRequest(f"--offer {text}: an encoder", place, "another kind: encoders on all joints are tried anyway")
+        raise BadRequest(
+            f"--candidate-sensor {text}: an encoder", place, "another kind: encoders on all joints are tried anyway"
+        )
     if "radius" in needs or ("at" if "at" in needs else "axis") not in needs or re.search("@|/[^/]*,[^/]*$", place):
         return [text]
     found = []

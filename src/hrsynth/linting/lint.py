@@ -76,7 +76,7 @@ def lint(
     files: str | Path | Iterable[str | Path],
     *,
     compare: str | Path | None = None,
-    reader: Iterable[str] | str = (),
+    program: Iterable[str] | str = (),
     ignore: Iterable[str] | str = (),
     fix: bool = False,
     output: str | Path | None = None,
@@ -84,7 +84,7 @@ def lint(
 ) -> Lint:
     """Everything that is wrong, doubtful or lost in robot files, by the rules of ``hrsynth.linting.rules``.
 
-    ``compare`` is another file of the same robot: differences between the two are reported too. ``reader`` names
+    ``compare`` is another file of the same robot: differences between the two are reported too. ``program`` names
     programs that should read the files: a closure that one of them loses is an error. ``ignore`` names rules to leave
     out. With ``fix`` everything that can be mended in only one way is mended, and the file is written, completely or
     not at all, to ``output`` or over the original (no link that is not named); the findings are then those that remain.
@@ -99,8 +99,8 @@ def lint(
     """
     require_keywords(lint, said, (each.name for each in fields(Overrides)))
     paths = list(files) if isinstance(files, Iterable) and not isinstance(files, str) else [files]
-    skipped, programs = names(ignore) or (), tuple(names(reader) or ())
-    for what, asked, known in (("rule", skipped, tuple(lint_rules())), ("reader", programs, PROGRAMS)):
+    skipped, programs = names(ignore) or (), tuple(names(program) or ())
+    for what, asked, known in (("rule", skipped, tuple(lint_rules())), ("program", programs, PROGRAMS)):
         unknown = [name for name in asked if name and name not in known]
         if unknown:
             raise BadRequest(f"no {what} of this name", unknown[0], known)

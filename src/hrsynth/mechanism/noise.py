@@ -80,7 +80,8 @@ class Noise:
                 raise BadRequest(
                     f"noise: nothing that is observed has errors in {IN_WORDS[unit][0]}",
                     str(self),
-                    [IN_WORDS[each][1] for each in sorted(known)] or "more to observe (--see): directions have cones",
+                    [IN_WORDS[each][1] for each in sorted(known)]
+                    or "more to observe (--sensor): directions have cones",
                 )
         amounts = dict(self.amounts)
         for each in observations:

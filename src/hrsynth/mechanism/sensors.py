@@ -22,7 +22,7 @@ from .observations.encoder import AngleEncoder, Encoder, SlideEncoder
 from .observations.line import SpaceLine
 
 Place = TypeVar("Place")
-INSTEAD = "another direction: --see direction:LINK/dx,dy,dz (in the link's frame), or <observe> in the file"
+INSTEAD = "another direction: --sensor direction:LINK/dx,dy,dz (in the link's frame), or <observe> in the file"
 """What can be watched of a leg that has no segment of its own."""
 TURNING = (JointType.REVOLUTE, JointType.CYLINDRICAL)
 

@@ -238,14 +238,14 @@ OUTPUTS = {
     ),
     "advise": Outputs("text.robots:advice"),
     "aspects": Outputs(
-        "text.poses:atlas",
+        "text.poses:aspects",
         (
             File(
-                "cannot draw the atlas",
+                "cannot draw the aspects",
                 figures("aspects:picture"),
-                "The picture of the atlas",
+                "The figure of the aspects",
                 "Draw the table and, for three rods on cranks in a plane, the singular curve with the modes: "
-                "atlas.png, .pdf, .svg.",
+                "aspects.png, .pdf, .svg.",
                 computed="aspects:section",
                 record="section",
                 nothing="aspects:undrawn",
@@ -309,7 +309,7 @@ OUTPUTS = {
                 "cannot draw the endings",
                 figures("equilibria:picture"),
                 "The picture of the endings",
-                "Draw the endings: endings.png, .pdf, .svg.",
+                "Draw the endings: equilibria.png, .pdf, .svg.",
                 drawn=True,
             ),
         ),

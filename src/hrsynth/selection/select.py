@@ -3,7 +3,6 @@ accuracy at the goal."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -101,23 +100,13 @@ class Criteria:
     """The pose of a camera on the link that carries it, or ``auto`` for one that sees all legs well."""
     focal: Annotated[float, option("Focal length of the camera, for pictures of 640 × 480 pixels.", "PIXELS")] = FOCAL
     """Its focal length (pixels)."""
-    seconds: Annotated[
-        float | None,
-        option(
-            "Deprecated, because the answer then depends on the machine: time after which no further set is examined.",
-            deprecated="what it leaves out depends on the machine: try --examine",
-        ),
-    ] = None
-    """Deprecated, as what is examined then depends on the machine: time after which no further set is begun."""
 
     def __post_init__(self) -> None:
         if self.visible_from is None and self.focal != FOCAL:
-            raise BadRequest("focal length without a camera", self.focal, "together with --sight")
+            raise BadRequest("focal length without a camera", self.focal, "together with --visible-from")
         for each in options_of(Criteria):
             if each.kind is int:
                 require_range(each.name, getattr(self, each.name), "an integer", each.low, each.high)
-        if self.seconds is not None and not self.seconds > 0:
-            raise BadRequest("seconds", self.seconds, "a positive number")
 
 
 @dataclass(frozen=True)
@@ -213,8 +202,8 @@ class Selection(Result, shown_as="select"):
     accurate at the goal first, then the discarded ones."""
 
     setup: Annotated[ObservedRobot, As(flat=True, without=("observed",))]
-    start: Annotated[Pose, As("from")]
-    goal: Annotated[Pose, As("to")]
+    start: Recorded[Pose]
+    goal: Recorded[Pose]
     candidates: Annotated[tuple[Candidate, ...], As("sets")]
     bounds: MeasurementBounds
     """How wrong each measurement may be."""
@@ -276,9 +265,9 @@ def select(
     camera: CameraLike = None,
     *,
     observe: LegsLike = None,
-    see: SeeLike = None,
+    sensor: SeeLike = None,
     start: StartPose,
-    goal: Annotated[PoseLike, option("Goal pose.", "POSE", old=("--to",))],
+    goal: Annotated[PoseLike, option("Goal pose.", "POSE")],
     cone: Annotated[
         Cones | None,
         option(
@@ -299,13 +288,13 @@ def select(
     all, or one per leg, by default 0.1°; MMT A.2) and ``noise`` of other observations (as ``0.3px,1mm,0.1deg``).
 
     The fields of :class:`Criteria` can be given by their names: ``size``, ``examine``, ``endings``, ``runs``,
-    ``sight``, ``focal``, ``seconds``. The sets are those of the legs or links ``observe`` and of what else the file or
-    ``see`` observes, by default of all legs. A set is discarded if it does not see every freedom, if an end is singular
-    or beyond joint limits, or something is behind its camera there, if the camera (``sight``) sees too little of a leg,
-    if start and goal are proved to lie in different aspects, or if a simulated run ends elsewhere. Modes, aspects and
-    endings are computed for the ``examine`` most accurate sets (endings for ``endings`` of them; the radius only for
-    directions of segments); the others are neither kept nor discarded. Runs are made from the best set on, until
-    ``runs`` of them have ended at the goal.
+    ``visible_from``, ``focal``. The sets are those of the legs or links ``observe`` and of what else the file or
+    ``sensor`` observes, by default of all legs. A set is discarded if it does not see every freedom, if an end is
+    singular or beyond joint limits, or something is behind its camera there, if the camera (``sight``) sees too little
+    of a leg, if start and goal are proved to lie in different aspects, or if a simulated run ends elsewhere. Modes,
+    aspects and endings are computed for the ``examine`` most accurate sets (endings for ``endings`` of them; the radius
+    only for directions of segments); the others are neither kept nor discarded. Runs are made from the best set on,
+    until ``runs`` of them have ended at the goal.
 
     Raises ``BadRequest``, ``PoseNotReached``.
 
@@ -313,10 +302,10 @@ def select(
     <Selection: 3rrr_m1: 7 sets, 1 kept, best 1, 2, 3>
     """
     wanted = [asked_pose(each) for each in (start, goal)]
-    setup = ObservedRobot.of(robot, observe, camera, see=see, seed=seed).telling(wanted)
+    setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed).telling(wanted)
     others = not all(o.by_segment for o in setup.observed)
     if others and criteria.visible_from is not None:
-        setup.by_segments("select with --sight")
+        setup.by_segments("select with --visible-from")
     if observe is None and not others:
         setup = replace(setup, observed=setup.all_legs)
     directed = any(isinstance(o, SeenAxis) for o in setup.observed)
@@ -331,7 +320,6 @@ def select(
         blur,
         _sight(setup, ends, criteria),
         criteria,
-        np.inf if criteria.seconds is None else time.monotonic() + criteria.seconds,
         seed,
     )
     labels = labels_of(setup.observed)
@@ -375,7 +363,6 @@ class _Work:
     blur: MeasurementBounds
     sight: CameraView | None
     criteria: Criteria
-    until: float
     seed: int
 
     def watching(self, legs: Sequence[str]) -> ObservedRobot:
@@ -458,12 +445,8 @@ class _Work:
             if candidate.discarded:
                 found.append(candidate)
                 continue
-            if left is None and (begun == most or time.monotonic() > self.until):
-                left = (
-                    f"the {begun} most accurate were"
-                    if begun == most
-                    else (f"the time ran out after the {begun} most accurate, on a faster machine there would be more")
-                )
+            if left is None and begun == most:
+                left = f"the {begun} most accurate were"
             if left is not None:
                 found.append(replace(candidate, examined=False))
                 continue

@@ -1,1 +1,1 @@
-"""The servo loop: control law, simulated runs, the physics bench and the camera bench."""
+"""The servo loop: control law, simulated runs, the dynamic simulation and the camera bench."""

@@ -1,4 +1,5 @@
-"""The physics bench: the same controller drives a mock-up in MuJoCo (the papers' virtual mock-up, MMT 5.1.1).
+"""The dynamic simulation: the same controller drives a MuJoCo model in MuJoCo (the papers' virtual MuJoCo model, MMT
+5.1.1).
 
 The directions are read from the simulated bodies, the motors' coordinates from their encoders. At each sample the
 model of the robot takes the motors' coordinates, and the speeds that the law commands are held until the next.
@@ -42,7 +43,7 @@ def simulator(what: str) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class DynamicSimulation:
-    """A mock-up that starts at a configuration of a robot."""
+    """A MuJoCo model that starts at a configuration of a robot."""
 
     setup: ObservedRobot
     start: ClosedConfiguration
@@ -50,7 +51,7 @@ class DynamicSimulation:
     @classmethod
     def of(cls, setup: ObservedRobot, start: ClosedConfiguration) -> DynamicSimulation:
         """The bench; raises ``MissingExtra``, and ``BadRequest`` where the robot's motors do not move all of it."""
-        simulator("the physics bench")
+        simulator("the dynamic simulation")
         observation_model = motors(setup)
         if relation(start, observation_model).unobserved_twists.shape[1]:
             raise BadRequest(
@@ -67,7 +68,7 @@ class DynamicSimulation:
 
     @cached_property
     def _model(self) -> Any:
-        return simulator("the physics bench").MjModel.from_xml_string(mockup(self.mechanism))
+        return simulator("the dynamic simulation").MjModel.from_xml_string(mockup(self.mechanism))
 
     @cached_property
     def _names(self) -> list[str]:
@@ -76,7 +77,7 @@ class DynamicSimulation:
     def run(self, loop: Loop, horizon: float) -> tuple[Run, Array]:
         """Run until the error is below ``BENCH_SETTLED`` or ``horizon`` (s); also the displacement of the platform
         since the start, as simulated, (4, 4)."""
-        mujoco = simulator("the physics bench")
+        mujoco = simulator("the dynamic simulation")
         model, data = self._model, mujoco.MjData(self._model)
         motors = [model.actuator(name).id for name in self._names]
         places = [int(model.joint(name).qposadr[0]) for name in self._names]
@@ -93,7 +94,7 @@ class DynamicSimulation:
         times: list[float] = []
         states: list[tuple[ClosedConfiguration, Command]] = []
         while time < horizon:
-            report(f"run of the mock-up, {time:.1f} s of {horizon:.3g} s at most")
+            report(f"run of the MuJoCo model, {time:.1f} s of {horizon:.3g} s at most")
             at_now = read_encoders(self.start, at, driven, data.qpos[places] / scale)
             if at_now is None:
                 stopped = OPEN

@@ -171,7 +171,7 @@ def supposed_planes(
         raise BadRequest(
             "--depth: nothing that is observed needs a depth",
             text,
-            "none, or --see of what is seen in an image: point, image_line, edge …",
+            "none, or --sensor of what is seen in an image: point, image_line, edge …",
         )
     return tuple(found)
 

@@ -1,4 +1,4 @@
-"""A robot as a physical mock-up: MJCF text with rods, masses and velocity servos on the robot's own motors.
+"""A robot as a physical MuJoCo model: MJCF text with rods, masses and velocity servos on the robot's own motors.
 
 Every body's frame is the base frame at the zero configuration, so that joint centres and axes are written as they are
 and a simulated body's pose is the displacement of its link. The loops are cut at their loosest joints; a cut joint is
@@ -94,7 +94,7 @@ def _cut(mechanism: Mechanism) -> tuple[list[tuple[Joint, str]], list[Joint]]:
     joints = list(mechanism.joints.values())
     for joint in joints:
         if joint.type is JointType.FREE:
-            raise BadMechanism(f"{mechanism.name}: a joint with six freedoms has no mock-up", joint.name)
+            raise BadMechanism(f"{mechanism.name}: a joint with six freedoms has no MuJoCo model", joint.name)
     weights = [_WEIGHTS[joint.type.value] - (DRIVEN if joint.actuated else 0.0) for joint in joints]
     tree = graphs.spanning_forest(mechanism.links, joints, weights)
     ordered = [(joint, near) for joint, near, _ in graphs.outward(mechanism.base, tree)]

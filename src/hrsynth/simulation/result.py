@@ -55,11 +55,11 @@ class Servo(Result, shown_as="servo"):
     """
 
     setup: Annotated[ObservedRobot, FLAT]
-    start: Annotated[Pose, As("from")]
-    goal: Annotated[Pose, As("to")]
+    start: Recorded[Pose]
+    goal: Recorded[Pose]
     desired: Measures
     gain: Recorded[float]
-    sense: Annotated[str, Literal["exact", "edges", "pictures"]]
+    sense: Annotated[str, Literal["exact", "edges", "images"]]
     noise: Noise | None
     run: Run
     track: SingularityTrack

@@ -48,11 +48,11 @@ SETTLED = 0.5
 """Part of a noisy run after which its errors are counted."""
 OVER = (LIMIT, UNSEEN, UNMEASURED, AWAY)
 """What ends a run for good: no loop without noise goes on from there."""
-EXACT, EDGES, PICTURES = "exact", "edges", "pictures"
+EXACT, EDGES, IMAGES = "exact", "edges", "images"
 ALLOWED_NOISE = {
     EXACT: "an angle, such as 0.1deg",
     EDGES: "pixels, such as 0.3px",
-    PICTURES: "none: the pictures have their own",
+    IMAGES: "none: the images have their own",
 }
 """How directions are measured, and the noise of each."""
 DIRECTIONS, ANGLES, PIXELS = ("directions", " degrees"), ("angles", " degrees"), ("image points", " px")
@@ -69,13 +69,13 @@ class Conditions:
     sense: Annotated[
         str,
         option(
-            "How directions are sensed: exact, edges (of the legs in a camera's image) or pictures (rendered).",
+            "How directions are sensed: exact, edges (of the legs in a camera's image) or images (rendered).",
             "SENSE",
-            words=("exact", "edges", "pictures"),
+            words=("exact", "edges", "images"),
         ),
     ] = EXACT
     """How what is observed is measured: ``exact`` (or with ``noise``, of directions in a cone about the true ones), of
-    legs also ``edges`` (from those of the legs before a camera, their ends wrong by ``noise``) or ``pictures`` (from
+    legs also ``edges`` (from those of the legs before a camera, their ends wrong by ``noise``) or ``images`` (from
     rendered ones)."""
     noise: Annotated[
         Noise | str | None, option("Errors of measurements, such as 0.1deg, 0.3px (in images) or 1mm.", "AMOUNT")
@@ -85,10 +85,10 @@ class Conditions:
     bias: Annotated[bool, option("Keep the error of each measurement constant.")] = False
     """Whether the errors of ``noise`` stay as they are at first."""
     lens: Camera | None = None
-    """The camera of ``edges`` and ``pictures``, its pose in the link that carries it (default: where it sees all legs
+    """The camera of ``edges`` and ``images``, its pose in the link that carries it (default: where it sees all legs
     well)."""
-    physics: Annotated[bool, option("Drive a simulated mock-up with rods, masses and velocity servos.")] = False
-    """Whether a mock-up in MuJoCo is driven, with dynamics."""
+    dynamics: Annotated[bool, option("Drive a simulated MuJoCo model with rods, masses and velocity servos.")] = False
+    """Whether a MuJoCo model in MuJoCo is driven, with dynamics."""
     depth: Depth = "exact"
     """The depth of what is seen in images, as the law assumes it: ``exact``, ``desired`` (that at the goal) or
     ``constant:0.5`` (m)."""
@@ -110,7 +110,7 @@ class Conditions:
         if self.sense not in ALLOWED_NOISE:
             raise BadRequest("sense", self.sense, tuple(ALLOWED_NOISE))
         units = () if noise is None else tuple(unit for unit, _ in noise.amounts)
-        if noise is not None and (self.sense == PICTURES or (self.sense == EDGES and units != ("px",))):
+        if noise is not None and (self.sense == IMAGES or (self.sense == EDGES and units != ("px",))):
             raise BadRequest(f"noise with sense {self.sense}", str(noise), ALLOWED_NOISE[self.sense])
         for what, value in (("gain", self.gain), ("duration", self.duration)):
             if value is not None and not 0 < value < math.inf:
@@ -119,9 +119,9 @@ class Conditions:
             raise BadRequest("duration", self.duration, f"at most {LONGEST_RUN:g} seconds")
         if self.time is not None and not 0 < self.time < math.inf:
             raise BadRequest("time", self.time, "a positive number of seconds")
-        if self.horizon > LONGEST_RUN and (self.noisy or self.physics):
+        if self.horizon > LONGEST_RUN and (self.noisy or self.dynamics):
             raise BadRequest(
-                "seconds of a run with noise or physics",
+                "seconds of a run with noise or dynamics",
                 self.horizon,
                 f"at most {LONGEST_RUN:g}: a shorter time, a larger gain",
             )
@@ -140,7 +140,7 @@ class Conditions:
     @property
     def horizon(self) -> float:
         """How long a run may take (s)."""
-        lasts = NOISY_LASTS if self.noisy or self.physics else LASTS
+        lasts = NOISY_LASTS if self.noisy or self.dynamics else LASTS
         return self.time or (self.duration or 0.0) + lasts / self.gain
 
 
@@ -158,9 +158,9 @@ def servo(
     observe: LegsLike = None,
     camera: CameraLike = None,
     *,
-    see: SeeLike = None,
+    sensor: SeeLike = None,
     start: StartPose,
-    goal: Annotated[PoseLike, option("Pose whose measurements are desired.", "POSE", old=("--to",))],
+    goal: Annotated[PoseLike, option("Pose whose measurements are desired.", "POSE")],
     conditions: Conditions,
     seed: Seed = 0,
 ) -> Servo:
@@ -168,8 +168,8 @@ def servo(
 
     The servo loop of MMT 2.3 from the pose ``start`` towards what is measured at ``goal``.
 
-    ``observe``, ``camera`` and ``see`` are as for ``derive``; each kind of observation has its error. The fields of
-    :class:`Conditions` can be given by their names: ``gain``, ``sense``, ``noise``, ``bias``, ``lens``, ``physics``,
+    ``observe``, ``camera`` and ``sensor`` are as for ``derive``; each kind of observation has its error. The fields of
+    :class:`Conditions` can be given by their names: ``gain``, ``sense``, ``noise``, ``bias``, ``lens``, ``dynamics``,
     ``depth``, ``duration``, ``time``.
 
     Raises ``BadRequest`` for unknown names, observations that do not see the platform, singular poses and those at
@@ -178,9 +178,9 @@ def servo(
     >>> hrsynth.servo("3rrr_m1", start="x=0,y=0,phi=0", goal="x=0.02,y=0,phi=0", gain=0.8)
     <Servo: 3rrr_m1, watching 1, 2, 3: ended at x=0.02,y=0,z=0,phi=0deg, goal>
     """
-    setup = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
-    if conditions.physics or conditions.sense != EXACT:
-        setup.by_segments(f"servo with {'physics' if conditions.physics else f'sense {conditions.sense}'}")
+    setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed)
+    if conditions.dynamics or conditions.sense != EXACT:
+        setup.by_segments(f"servo with {'dynamics' if conditions.dynamics else f'sense {conditions.sense}'}")
     task = ServoTask.of(setup, start=start, goal=goal, conditions=conditions, seed=seed)
     report("run")
     return task.run()
@@ -257,7 +257,7 @@ class ServoTask:
         given = self.conditions
         sensed = self.sense() if given.noisy else None
         loop = self.loop(sensed, smooth=not given.noisy or (given.amount is not None and given.amount.bias))
-        if not given.physics:
+        if not given.dynamics:
             return self.result(loop.simulate(self.start, given.horizon))
         return self.result(*DynamicSimulation.of(self.setup, self.start).run(loop, given.horizon))
 
@@ -290,7 +290,7 @@ class ServoTask:
         return RenderedImages(LegRenderer(mechanism, eye, observation_model.reference, rods))
 
     def result(self, run: Run, simulated: Array | None = None) -> Servo:
-        """What came of a run; ``simulated`` is the displacement (4, 4) of the platform on the physics bench."""
+        """What came of a run; ``simulated`` is the displacement (4, 4) of the platform on the dynamic simulation."""
         setup, motion, given = self.setup, self.setup.motion, self.conditions
         still = run
         over = run.stopped in OVER

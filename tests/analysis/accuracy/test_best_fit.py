@@ -185,7 +185,7 @@ def test_an_arm_that_hardly_sees_one_of_its_turns_is_followed_to_the_whole_error
         for kind, point in zip(("point", "point", "point", "depth"), points, strict=True)
     ]
     found = accuracy(
-        b.build(platform="l6"), camera="hand=l6@0,0,0/0,0,0/800", see=sights, noise="0.3px,1mm", nonlinear=4
+        b.build(platform="l6"), camera="hand=l6@0,0,0/0,0,0/800", sensor=sights, noise="0.3px,1mm", nonlinear=4
     )
     (linear,), (true,), length = found.poses, found.sampled, found.setup.mechanism.length
 

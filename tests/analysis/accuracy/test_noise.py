@@ -60,16 +60,16 @@ def robot(name: str, folder: Path) -> ObservedRobot:
             "example:panda",
             camera="hand=panda_hand@0,0,-0.3/0,0,0/800",
             samples=3,
-            see=[*(f"point:world@{at}" for at in spots), "distance:world@0.5,0.1,0"],
+            sensor=[*(f"point:world@{at}" for at in spots), "distance:world@0.5,0.1,0"],
         )
     if name == "delta":
         return ObservedRobot.of(
-            "delta", "1", EYE.replace("-0.4/", "-1.5/"), samples=3, see=[POINTS[0], "depth:platform@0.1,0,0"]
+            "delta", "1", EYE.replace("-0.4/", "-1.5/"), samples=3, sensor=[POINTS[0], "depth:platform@0.1,0,0"]
         )
     if name == "encoders":
-        return ObservedRobot.of("3rrr_m1", "1", samples=3, see=["encoder:shoulder_1", "encoder:shoulder_2"])
+        return ObservedRobot.of("3rrr_m1", "1", samples=3, sensor=["encoder:shoulder_1", "encoder:shoulder_2"])
     (folder / "body.urdf").write_text(BODY)
-    return ObservedRobot.of(folder / "body.urdf", camera=EYE, see=MORE[name], samples=3)
+    return ObservedRobot.of(folder / "body.urdf", camera=EYE, sensor=MORE[name], samples=3)
 
 
 def values(at: ClosedConfiguration, observed: tuple[Observation, ...], reference: str) -> list[Array]:
@@ -228,7 +228,7 @@ def test_what_is_no_amount_is_refused_in_a_line(name: str, given: dict[str, str]
 def test_what_a_sensor_makes_of_noise_to_first_order(kind: str, tmp_path: Path) -> None:
     """The images of the unit balls are what the simulated sensor gives, but for the square of the noise."""
     setup = next(
-        robot(name, tmp_path) for name, see in MORE.items() if any(each.startswith(f"{kind}:") for each in see)
+        robot(name, tmp_path) for name, sensor in MORE.items() if any(each.startswith(f"{kind}:") for each in sensor)
     )
     at, rng = setup.all_samples.start, np.random.default_rng(1)
     amounts = {"px": 0.3, "m": 1e-3, "rad": 1e-3}

@@ -55,7 +55,7 @@ def body(folder: Path) -> Mechanism:
 def test_what_is_enclosed_is_the_condition_of_the_configurations(name: str, robot: str, tmp_path: Path) -> None:
     """In numbers, and in balls, which hold the numbers."""
     given = body(tmp_path) if robot == "body" else load(robot)
-    aspects = PathPlanner.of(ObservedRobot.of(given, camera=EYE, see=SETS[name], samples=5))
+    aspects = PathPlanner.of(ObservedRobot.of(given, camera=EYE, sensor=SETS[name], samples=5))
     assert isinstance(aspects.condition, Named)
     assert isinstance(aspects.pattern, LegPattern), aspects.pattern
     assert not aspects.pattern.fitted
@@ -82,7 +82,7 @@ def test_what_is_enclosed_is_the_condition_of_the_configurations(name: str, robo
 def camera() -> Array:
     (found,) = {
         id(o.camera): o.camera
-        for o in ObservedRobot.of("gough_stewart", camera=EYE, see=POINTS, samples=3).observed
+        for o in ObservedRobot.of("gough_stewart", camera=EYE, sensor=POINTS, samples=3).observed
         if isinstance(o, CameraObservation)
     }.values()
     assert found is not None
@@ -115,7 +115,7 @@ def wrench_sign(setup: ObservedRobot, X: Array) -> float:
 
 @pytest.mark.parametrize("name", ["points", "lines"])
 def test_the_sign_of_the_condition_is_that_of_a_determinant(name: str, tmp_path: Path) -> None:
-    setup = ObservedRobot.of(body(tmp_path), camera=EYE, see=SETS[name], samples=3)
+    setup = ObservedRobot.of(body(tmp_path), camera=EYE, sensor=SETS[name], samples=3)
     aspects = PathPlanner.of(setup)
     assert isinstance(aspects.pattern, LegPattern)
     coordinates, enclosure = aspects.pattern.coordinates, aspects.enclosure(setup.all_samples.start)
@@ -142,7 +142,7 @@ def signs_along(answer: PathAnswer, view: Array) -> set[float]:
 def test_a_second_pose_with_the_same_image_of_three_points_is_reached_without_a_singularity(tmp_path: Path) -> None:
     """The atlas of a body that nothing holds: its pairs are those of path; no sign of the determinant changes."""
     robot = body(tmp_path)
-    found = hrsynth.aspects(robot, camera=EYE, see=POINTS)
+    found = hrsynth.aspects(robot, camera=EYE, sensor=POINTS)
     assert len(found.places) == len(found.listed.modes) > 1
     for pair in found.pairs:
         if pair.answer is None:
@@ -162,7 +162,7 @@ def test_a_second_pose_with_the_same_image_of_three_points_is_reached_without_a_
 
 
 def test_opposite_signs_separate(tmp_path: Path) -> None:
-    setup = ObservedRobot.of(body(tmp_path), camera=EYE, see=LINES, samples=3)
+    setup = ObservedRobot.of(body(tmp_path), camera=EYE, sensor=LINES, samples=3)
     signs: dict[float, str] = {}
     rng = np.random.default_rng(4)
     for _ in range(40):
@@ -180,9 +180,9 @@ def test_where_nothing_is_enclosed_the_way_is_sampled(tmp_path: Path) -> None:
     """An arm, encoders beside a direction, a conic: undecided, with the smallest singular value of sampled poses."""
     spots = ("0.5,0.1,0", "0.6,0.1,0.1", "0.5,0.3,0.1", "0.4,0.1,0.2")
     arm = ObservedRobot.of(
-        "example:panda", camera="hand=panda_hand@0,0,-0.3", samples=3, see=[f"point:world@{spot}" for spot in spots]
+        "example:panda", camera="hand=panda_hand@0,0,-0.3", samples=3, sensor=[f"point:world@{spot}" for spot in spots]
     )
-    motors = ObservedRobot.of("3rrr_m1", "1", see=["encoder:shoulder_1", "encoder:shoulder_2"], samples=3)
+    motors = ObservedRobot.of("3rrr_m1", "1", sensor=["encoder:shoulder_1", "encoder:shoulder_2"], samples=3)
     for setup, start, goal in (
         (arm, "x=0.3,y=0.1,z=0.5", "x=0.35,y=0.2,z=0.5"),
         (motors, "x=0,y=0,phi=0", "x=0.02,y=0,phi=0"),

@@ -171,7 +171,7 @@ def test_a_u_joint_that_carries_the_platform_holds_it_turned_by_half_a_turn_too(
         b.joint(f"p_{k}", "P", f"cylinder_{k}", f"rod_{k}", at=(A + B) / 2, axis=along, motor=True)
         b.joint(f"s_{k}", "S", f"rod_{k}", "plate", at=B, loop=True)
     b.observe("1", "tube", u)
-    found = modes(b.build(platform="plate"), "1", see=["encoder:p"])
+    found = modes(b.build(platform="plate"), "1", sensor=["encoder:p"])
     turned = [mode.bodies["plate"][:3, :3] for mode in found.modes]
     assert [mode.assembly for mode in found.modes] == ["yes", "yes"]
     assert min(np.abs(R - (2 * np.outer(u, u) - np.eye(3))).max() for R in turned) < 1e-9

@@ -13,7 +13,7 @@ from hrsynth.errors import TooLarge
 
 def test_fewer_branches_are_solved_with_less_effort_and_that_is_told():
     robot, _ = pods(["RRPS", "RRPS", "RRPS"], 1)
-    whole, few = (hrsynth.modes(robot, effort=effort) for effort in (10.0, 0.05))
+    whole, few = (hrsynth.modes(robot, time_limit=time_limit) for time_limit in (10.0, 0.05))
     assert whole.found.complete
     assert not few.found.complete
     assert few.found.bound == "none"
@@ -28,8 +28,8 @@ def test_a_system_that_needs_more_is_not_started():
     confined = hrsynth.modes(robot, real=True).confined
     assert confined is not None
     with pytest.raises(TooLarge, match=r"6 legs and 6 freedoms, needs about 0\.4 s, more than the effort of 0\.1 s"):
-        solve_all(confined, effort=0.1)
+        solve_all(confined, time_limit=0.1)
 
 
 def test_effort_may_be_without_end():
-    assert hrsynth.modes("rrrrr_m1", effort=float("inf")).found.complete
+    assert hrsynth.modes("rrrrr_m1", time_limit=float("inf")).found.complete

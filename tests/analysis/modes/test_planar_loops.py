@@ -341,7 +341,7 @@ def test_unknowns_of_loops_come_in_the_order_in_which_they_close():
 def test_measurements_of_one_freedom_hold_it_once():
     """Both cranks of the four-bar and the driven crank of the tool are measured: of the four-bar's two places one fits,
     the tool has two, which a search finds."""
-    listed = hrsynth.modes(carried("tool"), see=[f"encoder:{joint}" for joint in "ace"])
+    listed = hrsynth.modes(carried("tool"), sensor=[f"encoder:{joint}" for joint in "ace"])
     assert listed.found.complete
     assert len(listed.modes) == 2
     found = search(listed.goal, measured(listed).observation_model, placing_links(listed.setup.decomposition))
@@ -359,7 +359,7 @@ def test_measurements_of_one_freedom_hold_it_once():
 
 @pytest.mark.slow
 def test_a_tool_rests_at_both_its_places():
-    found = hrsynth.equilibria(carried("tool"), see=[f"encoder:{joint}" for joint in "ace"], at="x=0.35,y=0.9")
+    found = hrsynth.equilibria(carried("tool"), sensor=[f"encoder:{joint}" for joint in "ace"], goal="x=0.35,y=0.9")
     assert sorted(rest.kind for rest in found.points if rest.error < 1e-9) == ["goal", "mode"]
 
 

@@ -455,7 +455,7 @@ def moved_since_zero(found: AssemblyModes, at: ClosedConfiguration, joint: Joint
 
 
 WAYS = {
-    "tips": partial(solve_tips, as_written=False, effort=EFFORT),
+    "tips": partial(solve_tips, as_written=False, time_limit=EFFORT),
     "conditions": solve_posed,
     "loops": solve_loops,
     "carrier": solve_carried,

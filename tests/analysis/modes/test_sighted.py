@@ -120,8 +120,8 @@ def depths(points: Array, C: Array, starts: int = 2000) -> list[Array]:
 
 def three_points(at: Array, seed: int) -> AssemblyModes:
     """Modes of a free body with points (3, 3) in its frame, by a camera at the base's origin."""
-    see = [f"point:platform@{written(b)}" for b in at]
-    return modes(observe(free_body(np.random.default_rng(seed)), camera="eye=base@0,0,0", see=see, samples=4))
+    sensor = [f"point:platform@{written(b)}" for b in at]
+    return modes(observe(free_body(np.random.default_rng(seed)), camera="eye=base@0,0,0", sensor=sensor, samples=4))
 
 
 @pytest.mark.some(1, 10)
@@ -150,8 +150,8 @@ def test_all_four_can_be_in_front() -> None:
     body = free_body(builder)
     X = body.links["platform"].pose
     corners = [(0.5 * np.cos(t), 0.5 * np.sin(t), 1.1 + 0.01 * np.sin(5 * t)) for t in (0.1, 2.2, 4.3)]
-    see = ["point:platform@" + written(X[:3, :3].T @ (np.array(b) - X[:3, 3])) for b in corners]
-    found = modes(observe(body, camera="eye=base@0.01,0.02,0", see=see, samples=4))
+    sensor = ["point:platform@" + written(X[:3, :3].T @ (np.array(b) - X[:3, 3])) for b in corners]
+    found = modes(observe(body, camera="eye=base@0.01,0.02,0", sensor=sensor, samples=4))
     assert (found.found.complex, len(found.modes), len(found.antipodal)) == (8, 4, 4)
 
 
@@ -165,23 +165,23 @@ def test_four_points_leave_one_mode() -> None:
 GOUGH = ("point:platform@0.1,0,0", "point:platform@-0.1,0.1,0", "point:platform@0,0.1,0.1")
 BASE = ("point:base@0.1,0,0", "point:base@-0.1,0.1,0", "point:base@0,0.1,0.1")
 ROBOTS = {
-    "seen from the base": lambda: observe("gough_stewart", camera="eye=base@0.3,0.1,0", see=GOUGH),
-    "camera on the platform": lambda: observe("gough_stewart", camera="eye=platform@0.3,0.1,0", see=BASE),
+    "seen from the base": lambda: observe("gough_stewart", camera="eye=base@0.3,0.1,0", sensor=GOUGH),
+    "camera on the platform": lambda: observe("gough_stewart", camera="eye=platform@0.3,0.1,0", sensor=BASE),
     "cameras on both": lambda: observe(
         "gough_stewart",
         camera=["eye=base@0.3,0.1,0", "hand=platform@0.03,0.01,-0.1"],
-        see=["eye=" + GOUGH[0], "hand=" + BASE[0], "eye=" + GOUGH[1]],
+        sensor=["eye=" + GOUGH[0], "hand=" + BASE[0], "eye=" + GOUGH[1]],
     ),
-    "beside legs": lambda: observe("gough_stewart", "1,3", camera="eye=base@0.3,0.1,0", see=GOUGH[:1]),
+    "beside legs": lambda: observe("gough_stewart", "1,3", camera="eye=base@0.3,0.1,0", sensor=GOUGH[:1]),
     "beside legs, from the platform": lambda: observe(
-        "gough_stewart", "1,3", camera="eye=platform@0.3,0.1,0", see=BASE[:1]
+        "gough_stewart", "1,3", camera="eye=platform@0.3,0.1,0", sensor=BASE[:1]
     ),
-    "an arm": lambda: observe(arm(), camera="eye=platform@0.02,0.01,0.1", see=BASE),
+    "an arm": lambda: observe(arm(), camera="eye=platform@0.02,0.01,0.1", sensor=BASE),
     "translations": lambda: observe(
-        "delta", camera="eye=platform@0.1,0.1,0.2", see=["point:base@0.1,0.3,0", "distance:base@0.3,0,0.2"]
+        "delta", camera="eye=platform@0.1,0.1,0.2", sensor=["point:base@0.1,0.3,0", "distance:base@0.3,0,0.2"]
     ),
     "a plane": lambda: observe(
-        "3rrr_m1", camera="eye=platform@0.1,0.05,-0.3", see=["point:base@0.1,0.3,0", "distance:base@0.3,0,0.2"]
+        "3rrr_m1", camera="eye=platform@0.1,0.05,-0.3", sensor=["point:base@0.1,0.3,0", "distance:base@0.3,0,0.2"]
     ),
 }
 QUICKLY = ("a plane",)
@@ -218,7 +218,9 @@ def test_what_random_starts_of_the_whole_robot_find_is_listed(name: str) -> None
 
 def test_a_leg_that_restricts_turns_counts_too() -> None:
     """A 3-RPS moves with three freedoms; its legs' planes are conditions beside what is seen."""
-    setup = observe("3rps", camera="eye=base@0.3,0.1,0", see=["point:platform@0.1,0,0", "distance:platform@-0.1,0.1,0"])
+    setup = observe(
+        "3rps", camera="eye=base@0.3,0.1,0", sensor=["point:platform@0.1,0,0", "distance:platform@-0.1,0.1,0"]
+    )
     found = modes(setup, at=setup.configurations[0])
     assert (found.found.complex, found.found.complete) == (16, True)
 
@@ -226,22 +228,24 @@ def test_a_leg_that_restricts_turns_counts_too() -> None:
 def test_behind_the_camera_is_told_where_it_has_a_name() -> None:
     """A camera that looks the other way sees the same rays, none of them in front."""
     for turn, behind in (("", ()), ("/180deg,0,0", ("point_1", "point_2", "point_3"))):
-        found = modes("gough_stewart", camera=f"eye=base@0.3,0.1,0{turn}", see=GOUGH)
+        found = modes("gough_stewart", camera=f"eye=base@0.3,0.1,0{turn}", sensor=GOUGH)
         assert found.modes[0].behind == behind
         assert found.to_dict()["modes"][0]["behind"] == list(behind)
         block = hrsynth.text(found).split("mode 2")[0]
         assert ("in front of the camera" in block) == (not behind)
-    assert modes("gough_stewart", see=GOUGH).modes[0].behind is None
+    assert modes("gough_stewart", sensor=GOUGH).modes[0].behind is None
 
 
 def test_a_certificate_of_what_is_seen_is_accepted() -> None:
-    found = modes("gough_stewart", camera="eye=platform@0.3,0.1,0", see=BASE)
+    found = modes("gough_stewart", camera="eye=platform@0.3,0.1,0", sensor=BASE)
     record = hrsynth.certificate(found)
     assert record["real"] == len(found.modes) + len(found.antipodal)
     assert hrsynth.verify(record)
     with pytest.raises(NoCertificate):
         hrsynth.certificate(
-            modes("gough_stewart", camera="eye=base@0.3,0.1,0", see=[*GOUGH[:2], "image_line:platform@0,0.1,0.1/1,0,0"])
+            modes(
+                "gough_stewart", camera="eye=base@0.3,0.1,0", sensor=[*GOUGH[:2], "image_line:platform@0,0.1,0.1/1,0,0"]
+            )
         )
 
 
@@ -266,9 +270,9 @@ def refined(goal: Array, there: Array, C: Array) -> Array:
 @pytest.mark.parametrize("back", [False, True])
 def test_the_exact_pose_is_within_the_radius(back: bool) -> None:
     """The places of the three points at each mode, by the cosine laws to 40 digits, are as near as the radius says."""
-    camera, see = ("eye=platform@0.3,0.1,0", BASE) if back else ("eye=base@0.3,0.1,0", GOUGH)
-    found = modes("gough_stewart", camera=camera, see=see)
-    points = np.array([[float(x) for x in text.split("@")[1].split(",")] for text in see])
+    camera, sensor = ("eye=platform@0.3,0.1,0", BASE) if back else ("eye=base@0.3,0.1,0", GOUGH)
+    found = modes("gough_stewart", camera=camera, sensor=sensor)
+    points = np.array([[float(x) for x in text.split("@")[1].split(",")] for text in sensor])
     C, X = np.array([0.3, 0.1, 0.0]), found.goal.pose("platform")
     assert len(found.modes) > 1
     for mode in (*found.modes, *found.antipodal):
@@ -288,9 +292,9 @@ def test_the_exact_pose_is_within_the_radius(back: bool) -> None:
 def test_encoders_of_legs_are_held_with_the_legs() -> None:
     """What is asked by a name of its own is a leg's all the same; so is a point of a link that is platform and leg."""
     joint = next(joint.name for joint in hrsynth.load("3rrr_m1").joints.values() if joint.actuated)
-    found = modes("3rrr_m1", see=[f"encoder:{joint}", "distance:platform@0.1,0.3,0", "distance:platform@0.3,0,0"])
+    found = modes("3rrr_m1", sensor=[f"encoder:{joint}", "distance:platform@0.1,0.3,0", "distance:platform@0.3,0,0"])
     assert (found.found.complex, found.found.complete) == (4, True)  # circles about one centre: two shapes, two turns
-    other = modes("rrrrr_m1", camera="eye=base@0.3,0.1,0.5", see="point:dist_1@0.1,0,0")
+    other = modes("rrrrr_m1", camera="eye=base@0.3,0.1,0.5", sensor="point:dist_1@0.1,0,0")
     assert (other.found.complete, len(other.modes)) == (True, 2)
     found = search(
         other.goal, MeasuredRobot.of_directions(other.setup).observation_model, leg_ends(other.setup.decomposition)
@@ -300,4 +304,4 @@ def test_encoders_of_legs_are_held_with_the_legs() -> None:
 
 def test_motors_are_held_or_what_is_seen() -> None:
     with pytest.raises(BadRequest):
-        modes("gough_stewart", see=GOUGH, real=True)
+        modes("gough_stewart", sensor=GOUGH, real=True)

@@ -37,14 +37,14 @@ def watched(kinds: Sequence[str], seed: int, cameras: bool = False) -> ObservedR
         f"eye_{k}=base@{written(rng.uniform(-0.2, 0.2, 3))}/{written(rng.uniform(-0.2, 0.2, 3))}"
         for k in range(len(kinds) if cameras else 1)
     ]
-    see = []
+    sensor = []
     for k, kind in enumerate(kinds):
         needs = known()[kind].needs
         at, axis = written(rng.uniform(-0.4, 0.4, 3)), written(random_direction(rng))
-        see.append(
+        sensor.append(
             f"eye_{k if cameras else 0}={kind}:platform"
             + (f"@{at}" if "at" in needs else "")
             + (f"/{axis}" if "axis" in needs else "")
             + ("/0.05" if "radius" in needs else "")
         )
-    return observe(body, camera=eyes, see=see, samples=4)
+    return observe(body, camera=eyes, sensor=sensor, samples=4)

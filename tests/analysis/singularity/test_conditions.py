@@ -231,13 +231,13 @@ def test_a_condition_without_named_wrenches_defines_its_symbols_and_tells_no_ang
 def test_a_line_and_a_plane_are_told_by_their_vectors():
     """A translating platform slides along a seen vertical line; its seen distance stays where it is at the camera's
     height."""
-    see = ["line:platform@0,0,0/0,0,1", "distance:platform@0.1,0,0"]
-    answer = singularities("3upu", camera="eye=base@0.3,0,0.3", see=see, points=100)
+    sensor = ["line:platform@0,0,0/0,0,1", "distance:platform@0.1,0,0"]
+    answer = singularities("3upu", camera="eye=base@0.3,0,0.3", sensor=sensor, points=100)
     assert answer.words == "z4 is parallel to the plane normal to r5"
     assert answer.examples
     for each in answer.examples:
         assert abs(each.pose.to_dict()["z"] - 0.3) < 1e-6
-    both = singularities("3upu", "1", see=see, points=100)
+    both = singularities("3upu", "1", sensor=sensor, points=100)
     assert both.words == "the watched directions u1 and the z axes z4 are parallel, also to the plane normal to r5"
 
 

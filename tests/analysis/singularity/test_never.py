@@ -221,7 +221,7 @@ def couples(at: Array) -> Array:
 
 def test_never_does_not_speak_of_constraint_singularities() -> None:
     """Where the three moments are dependent the 3-UPU can turn about the seen point, which rests."""
-    answer = singularities("3upu", see=["position:platform@0,0,0"], points=60)
+    answer = singularities("3upu", sensor=["position:platform@0,0,0"], points=60)
     assert answer.condition is not None
     assert answer.condition.never
     assert any("constraint singularities" in each for each in answer.unexamined)
@@ -231,7 +231,7 @@ def test_never_does_not_speak_of_constraint_singularities() -> None:
     ray = next(x for x in here if np.linalg.det(couples(x)) * home < 0)
     place = load("3upu").links["platform"].pose[:3, 3] + ray * brentq(lambda t: np.linalg.det(couples(t * ray)), 0, 1)
     at = ",".join(f"{name}={value:.15g}" for name, value in zip("xyz", place, strict=True))
-    (there,) = check("3upu", see=["position:platform@0,0,0"], at=at).to_dict()["configurations"]
+    (there,) = check("3upu", sensor=["position:platform@0,0,0"], at=at).to_dict()["configurations"]
     assert there["dof"] == 4
     assert there["rank"] == 3
 
@@ -249,7 +249,7 @@ def test_constraint_singularities_are_not_named_where_legs_cannot_turn_the_platf
             made.joint(
                 f"{kind}{n}_{k}", kind, bodies[n], bodies[n + 1], places[n], axis=a, motor=n == 0, loop=n == 3 and k > 0
             )
-    answer = singularities(made.build("platform"), see=["position:platform@0,0,0"], points=60)
+    answer = singularities(made.build("platform"), sensor=["position:platform@0,0,0"], points=60)
     assert answer.condition is not None
     assert answer.condition.never
     assert answer.unexamined == ()
@@ -261,7 +261,7 @@ def test_what_is_fixed_in_a_platform_that_translates_is_constant(up: float) -> N
     so there is none at all if the line is not in such a plane, and one everywhere else."""
     axis = unit(np.array([1.0, 0.3, up]))
     seen = ["depth:platform@0.1,0,0", f"line:platform@0.1,0.1,0/{text(axis).replace(' ', ',')}"]
-    answer = singularities(mechanism(parse("3(Pk*-Ra-Ra-Ra)"), 0), see=seen, points=30)
+    answer = singularities(mechanism(parse("3(Pk*-Ra-Ra-Ra)"), 0), sensor=seen, points=30)
     z = answer.setup.mechanism.links["platform"].pose[:3, :3] @ axis @ np.array([0.0, 0.0, 1.0])
     assert (abs(z) > 0.1) == (up > 0.0)
     assert answer.always == (up == 0.0)

@@ -134,16 +134,16 @@ def test_a_crank_at_rest_lets_its_rocker_move_at_a_dead_point(real: bool, tmp_pa
 
 @pytest.mark.parametrize("see", ["inclination:r0/0.3,0.5,0.8", "position:r0@0.1,0.2,0.3"])
 @pytest.mark.slow
-def test_other_observations_of_a_legs_link_may_fail_at_special_poses(see: str, tmp_path: Path):
+def test_other_observations_of_a_legs_link_may_fail_at_special_poses(sensor: str, tmp_path: Path):
     """The rod of a U joint turns about the vertical where this lies in the plane of the joint's axes."""
-    _, answer = told(tmp_path, sliding_platform(0.0)[0], "2", see=[see])
+    _, answer = told(tmp_path, sliding_platform(0.0)[0], "2", sensor=[sensor])
     assert answer.condition is not None
     assert not answer.condition.never
 
 
 def test_the_inclination_of_a_legs_link_is_compared_with_the_rank():
     """Words and rank of a leg whose observation bears another name than the leg."""
-    answer = singularities("prrrp_m1", "1", see=["inclination:dist_2/1,0,0"], points=60)
+    answer = singularities("prrrp_m1", "1", sensor=["inclination:dist_2/1,0,0"], points=60)
     assert answer.condition is not None
     assert answer.condition.never
     assert answer.checked is not None

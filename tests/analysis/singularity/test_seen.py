@@ -34,8 +34,8 @@ LINES = [
 UPRIGHT = "inclination:platform"
 
 
-def seen(*see: str, camera: str | list[str] = EYE, robot: str = "gough_stewart", points: int = 60) -> Singularity:
-    return singularities(robot, camera=camera, see=list(see), points=points)
+def seen(*sensor: str, camera: str | list[str] = EYE, robot: str = "gough_stewart", points: int = 60) -> Singularity:
+    return singularities(robot, camera=camera, sensor=list(sensor), points=points)
 
 
 def off_the_cylinder(P: Array, C: Array) -> float:
@@ -94,9 +94,9 @@ def test_four_points_are_on_all_danger_cylinders() -> None:
         (POINTS[:3], "the directions r4, r5, r6 are all parallel"),
     ],
 )
-def test_a_platform_that_translates_has_a_condition_of_all_kinds(see: list[str], words: str) -> None:
+def test_a_platform_that_translates_has_a_condition_of_all_kinds(sensor: list[str], words: str) -> None:
     """Three vectors have rank two just there; each is named by what it is."""
-    setup = ObservedRobot.of("delta", camera=EYE, see=see)
+    setup = ObservedRobot.of("delta", camera=EYE, sensor=sensor)
     assert MeasuredRobot.of_directions(setup).condition.words == words
 
 
@@ -128,8 +128,8 @@ def test_points_on_one_line() -> None:
         ),
     ],
 )
-def test_closed_conditions(see: list[str], words: str, expression: str) -> None:
-    found = seen(*see)
+def test_closed_conditions(sensor: list[str], words: str, expression: str) -> None:
+    found = seen(*sensor)
     assert words in found.words
     assert found.condition is not None
     assert str(found.condition.expression) == expression
@@ -181,9 +181,9 @@ def test_closed_conditions(see: list[str], words: str, expression: str) -> None:
         ("3rps", EYE, POINTS[:2], "B3 normal to a3, B4 along r4 and B5 along r5"),
     ],
 )
-def test_words_expression_and_rank_agree(robot: str, camera: str | list[str], see: list[str], words: str) -> None:
+def test_words_expression_and_rank_agree(robot: str, camera: str | list[str], sensor: list[str], words: str) -> None:
     """``singular`` itself compares them, with Pinocchio's rank and with what each observation leaves."""
-    assert words in seen(*see, camera=camera, robot=robot).words
+    assert words in seen(*sensor, camera=camera, robot=robot).words
 
 
 @pytest.mark.some(1)
@@ -195,9 +195,9 @@ def test_words_expression_and_rank_agree(robot: str, camera: str | list[str], se
     ],
 )
 @pytest.mark.parametrize("robot", ["gough_stewart", "delta"])
-def test_the_screws_of_all_joints_give_pinocchios_singular_values(robot: str, see: list[str]) -> None:
+def test_the_screws_of_all_joints_give_pinocchios_singular_values(robot: str, sensor: list[str]) -> None:
     """Lengths are in characteristic lengths in both, whatever the robot's size."""
-    setup = ObservedRobot.of(robot, camera="eye=base@0.3,0.1,0.2", see=see)
+    setup = ObservedRobot.of(robot, camera="eye=base@0.3,0.1,0.2", sensor=sensor)
     observation_model, chunk = setup.samples.observation_model, setup.configurations[:5]
     smallest, largest = spectrum(chunk, observation_model)
     for at, low, high in zip(chunk, smallest, largest, strict=True):
@@ -228,13 +228,13 @@ def slider_crank() -> Mechanism:
         ("point:platform@0,0,0", "eye=base@0,0,-1"),
     ],
 )
-def test_legs_that_are_not_watched_hold_as_well(see: str, camera: str | None) -> None:
+def test_legs_that_are_not_watched_hold_as_well(sensor: str, camera: str | None) -> None:
     """With one freedom the condition of what is seen alone is not the robot's: it is that of all joints."""
     robot = slider_crank()
-    found = singularities(robot, camera=camera, see=[see], points=60)
+    found = singularities(robot, camera=camera, sensor=[sensor], points=60)
     assert found.checked.disagreements == 0
     assert found.checked.smallest > 1e-4
-    answer = path(robot, camera=camera, see=see, start="x=0.5", goal="x=0.3")
+    answer = path(robot, camera=camera, sensor=sensor, start="x=0.5", goal="x=0.3")
     assert answer.verdict == "undecided"
     assert "locus" not in answer.reason
     assert min(answer.start.value, answer.goal.value) > 1e-2
@@ -245,5 +245,5 @@ def test_a_robot_of_one_coordinate_is_read() -> None:
     b.link("base")
     b.link("platform", at=(0.5, 0, 0))
     b.joint("slide", "P", "base", "platform", at=(0.5, 0, 0), axis=(1, 0, 0), motor=True)
-    found = derive(b.build(platform="platform"), camera="eye=base@0.1,0,0", see="distance:platform@0,0,0")
+    found = derive(b.build(platform="platform"), camera="eye=base@0.1,0,0", sensor="distance:platform@0,0,0")
     assert (found.verdict.rank, found.verdict.dof) == (1, 1)

@@ -245,7 +245,7 @@ def main() -> None:
     for name in sys.argv[2:]:
         robot, _, legs = name.partition(":")
         began = time.time()
-        found = equilibria(robot, legs or None, at=GOALS[robot])
+        found = equilibria(robot, legs or None, goal=GOALS[robot])
         listed = time.time()
         result = counted(found, int(sys.argv[1]))
         print(

@@ -451,7 +451,7 @@ def counted(found: Equilibria, starts: int, seed: int = 1) -> Counted:
 
 def listed(name: str, legs: str | None) -> Equilibria:
     """The list that is counted again: all rests with the directions at the robot's goal."""
-    return equilibria(name, legs, at=GOALS[name])
+    return equilibria(name, legs, goal=GOALS[name])
 
 
 def main() -> None:

@@ -27,8 +27,8 @@ ARMS = {
 @cache
 def found(name: str) -> Equilibria:
     hand, points, at = ARMS[name]
-    see = ["point:world@" + ",".join(map(str, point)) for point in points]
-    return hrsynth.equilibria(f"example:{name}", camera=f"hand={hand}", see=see, at=at)
+    sensor = ["point:world@" + ",".join(map(str, point)) for point in points]
+    return hrsynth.equilibria(f"example:{name}", camera=f"hand={hand}", sensor=sensor, goal=at)
 
 
 def at_rest(name: str, configuration: ClosedConfiguration) -> Array:
@@ -116,8 +116,8 @@ def test_what_moves_though_the_hand_rests_parts_nothing() -> None:
     """The elbow of an arm with seven joints, not of one with six."""
     for name, free in (("panda", True), ("ur5_robot", False)):
         hand, points, _ = ARMS[name]
-        see = ["point:world@" + ",".join(map(str, point)) for point in points]
-        setup = ObservedRobot.of(f"example:{name}", camera=f"hand={hand}", see=see)
+        sensor = ["point:world@" + ",".join(map(str, point)) for point in points]
+        setup = ObservedRobot.of(f"example:{name}", camera=f"hand={hand}", sensor=sensor)
         told = {o.leg for o in told_by(setup)}
         assert told >= set(setup.labels)
         assert (told == {o.leg for o in setup.all_samples.observation_model.observations}) is not free

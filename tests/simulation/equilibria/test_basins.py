@@ -256,7 +256,7 @@ GRID = "x=0:0.3:6,y=0:0.3:7,phi=0"
 
 @cache
 def small() -> module.Basins:
-    return hrsynth.basins("3rpr_m1", to="x=0,y=0,phi=0", grid=GRID, jobs=1)
+    return hrsynth.basins("3rpr_m1", goal="x=0,y=0,phi=0", grid=GRID, jobs=1)
 
 
 @pytest.mark.slow
@@ -281,7 +281,7 @@ def few_single_runs(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_ends_do_not_depend_on_how_the_work_is_shared_out(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(module, "FLOW_PART", 5)
     hrsynth.clear_cache()
-    found = hrsynth.basins("3rpr_m1", to="x=0,y=0,phi=0", grid=GRID, jobs=1)
+    found = hrsynth.basins("3rpr_m1", goal="x=0,y=0,phi=0", grid=GRID, jobs=1)
     # at a singularity of the law the last digits decide
     firm = ~(found.damped | small().damped)
     assert firm.sum() > 20
@@ -292,7 +292,7 @@ def test_ends_do_not_depend_on_how_the_work_is_shared_out(monkeypatch: pytest.Mo
 @pytest.mark.long
 def test_ends_do_not_depend_on_the_number_of_processes(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(module, "FLOW_PART", 20)
-    both = [hrsynth.basins("3rpr_m1", to="x=0,y=0,phi=0", grid=GRID, jobs=jobs) for jobs in (1, 2)]
+    both = [hrsynth.basins("3rpr_m1", goal="x=0,y=0,phi=0", grid=GRID, jobs=jobs) for jobs in (1, 2)]
     assert both[0].to_dict() == both[1].to_dict()
 
 
@@ -316,7 +316,7 @@ def test_every_start_within_the_certified_radius_ends_at_the_goal():
 
 @pytest.mark.slow
 def test_what_is_drawn_as_certified_is_around_the_goal():
-    found = hrsynth.basins("3rpr_m1", to="x=0,y=0,phi=0", grid="x=-0.1:0.1:5,y=-0.1:0.1:5,phi=0", jobs=1)
+    found = hrsynth.basins("3rpr_m1", goal="x=0,y=0,phi=0", grid="x=-0.1:0.1:5,y=-0.1:0.1:5,phi=0", jobs=1)
     grid, inside = found.region
     x, y = (values for _, values in grid.axes)
     far = np.hypot(*np.meshgrid(x, y, indexing="ij"))
@@ -337,7 +337,7 @@ def test_the_table_has_a_line_a_start():
 @pytest.mark.some(0, 1)
 @pytest.mark.parametrize("grid", ["x=-0.02:0.02:4,y=0.02,phi=0", "x=-0.02:0.02:3,y=0:0.01:2,phi=-0.1:0.1:2"])
 def test_lines_and_boxes_are_drawn(grid: str, tmp_path):
-    found = hrsynth.basins("3rrr_m1", to="x=0,y=0,phi=0", grid=grid, jobs=1)
+    found = hrsynth.basins("3rrr_m1", goal="x=0,y=0,phi=0", grid=grid, jobs=1)
     hrsynth.draw(found, tmp_path / "basins.png")
     assert (tmp_path / "basins.png").read_bytes().startswith(b"\x89PNG")
     assert "100 %" in repr(found)
@@ -350,7 +350,7 @@ def test_ends_are_drawn_where_a_robot_stands_aslant_too(tmp_path, monkeypatch: p
     robot = transformed(hrsynth.load("3rrr_m1"), R, np.array([0.1, 0.2, 0.3]))
     x, y, _ = hrsynth.observe(robot).motion.home[:3, 3]
     grid = f"x={x - 0.01}:{x + 0.01}:2,y={y - 0.01}:{y + 0.01}:2,phi=0"
-    found = hrsynth.basins(robot, to=f"x={x},y={y},phi=0", grid=grid, jobs=1)
+    found = hrsynth.basins(robot, goal=f"x={x},y={y},phi=0", grid=grid, jobs=1)
     drawn = []
     plot = Axes.plot
     monkeypatch.setattr(Axes, "plot", lambda *given, **style: (drawn.append(given[1:]), plot(*given, **style))[1])
@@ -360,7 +360,7 @@ def test_ends_are_drawn_where_a_robot_stands_aslant_too(tmp_path, monkeypatch: p
 
 @pytest.mark.slow
 def test_other_robots_are_simulated_one_by_one():
-    found = hrsynth.basins("rrrrr_m1", to="x=0.02,y=0.24", grid="x=0:0.02:2,y=0.22:0.24:2", jobs=1)
+    found = hrsynth.basins("rrrrr_m1", goal="x=0.02,y=0.24", grid="x=0:0.02:2,y=0.22:0.24:2", jobs=1)
     assert not found.batched
     assert found.followed == found.starts == 4
     assert [each.run_outcome.name for each in found.ends] == ["goal"]
@@ -376,7 +376,7 @@ def test_other_robots_are_simulated_one_by_one():
 )
 def test_what_cannot_be_asked_is_refused(asked: dict[str, str], word: str):
     with pytest.raises(BadRequest, match=word):
-        hrsynth.basins("quattro", "1,4", to="z=-0.7", **asked)
+        hrsynth.basins("quattro", "1,4", goal="z=-0.7", **asked)
 
 
 def test_every_ending_has_its_colours_and_its_mark():
@@ -397,7 +397,7 @@ def test_letters_of_ends_that_are_near_each_other_are_apart(marks: list[tuple[fl
 @pytest.mark.slow
 def test_a_servo_run_takes_the_example_of_each_end_and_ends_there():
     """The platform's turn follows from x and y: an example that says another one is refused."""
-    found = hrsynth.basins("rrrrr_m1", to="x=0.02,y=0.15", grid="x=-0.01:0.24:2,y=-0.08:0.1:2", jobs=1)
+    found = hrsynth.basins("rrrrr_m1", goal="x=0.02,y=0.15", grid="x=-0.01:0.24:2,y=-0.08:0.1:2", jobs=1)
     assert len(found.ends) > 2
     for each in found.ends:
         run = hrsynth.servo("rrrrr_m1", start=str(each.example), goal="x=0.02,y=0.15")
@@ -410,13 +410,13 @@ POINTS = ("point:platform@0.1,0,0", "point:platform@-0.1,0.1,0", "point:platform
 
 
 def test_a_goal_behind_the_camera_is_told_to_be_the_goal():
-    seen = hrsynth.observe("gough_stewart", camera="eye=base@0,0,1.5", see=POINTS)
+    seen = hrsynth.observe("gough_stewart", camera="eye=base@0,0,1.5", sensor=POINTS)
     with pytest.raises(BadRequest, match="camera at the goal"):
-        hrsynth.basins(seen, to="z=0.33", grid="x=0:0.1:2")
+        hrsynth.basins(seen, goal="z=0.33", grid="x=0:0.1:2")
 
 
 def test_why_runs_are_simulated_one_by_one_is_told():
-    seen = hrsynth.observe("gough_stewart", camera="eye=base@0,0,-0.6", see=POINTS)
+    seen = hrsynth.observe("gough_stewart", camera="eye=base@0,0,-0.6", sensor=POINTS)
     assert module.hindrances(seen) == ("observations of kind point are fed back",)
     assert module.hindrances(ObservedRobot.of("rrrrr_m1")) == ("a leg has no closed form",)
     assert module.hindrances(ObservedRobot.of("3rrr_m1")) == ()
@@ -432,7 +432,7 @@ def test_why_runs_are_simulated_one_by_one_is_told():
     ],
 )
 def test_hollow_marks_are_in_the_legend_where_there_is_one(grid: str, hollow: bool):
-    found = hrsynth.basins("3rrr_m1", to="x=0,y=0,phi=0", grid=grid, jobs=1)
+    found = hrsynth.basins("3rrr_m1", goal="x=0,y=0,phi=0", grid=grid, jobs=1)
     drawn = picture(found, replace(PNG, ending=".svg")).decode()
     assert ("hollow: at another" in drawn) == hollow
 
@@ -440,7 +440,7 @@ def test_hollow_marks_are_in_the_legend_where_there_is_one(grid: str, hollow: bo
 @pytest.mark.slow
 def test_the_legend_has_the_marks_that_are_drawn_and_no_others():
     """A mark of an end beyond the map is not drawn; ends of one kind have colours of their own, however many."""
-    found = hrsynth.basins("3rrr_m1", to="x=0,y=0,phi=0", grid="x=-0.02:0.02:2,y=-0.02:0.02:2,phi=0", jobs=1)
+    found = hrsynth.basins("3rrr_m1", goal="x=0,y=0,phi=0", grid="x=-0.02:0.02:2,y=-0.02:0.02:2,phi=0", jobs=1)
     (goal,) = found.ends
     near, far = goal.X.copy(), goal.X.copy()
     near[0, 3] += 0.01
@@ -458,4 +458,4 @@ def test_the_legend_has_the_marks_that_are_drawn_and_no_others():
 
 def test_starts_out_of_reach_are_refused():
     with pytest.raises(NoReachablePose, match="none of 2"):
-        hrsynth.basins("3rrr_m1", to="x=0,y=0,phi=0", grid="x=5:6:2,y=0,phi=0")
+        hrsynth.basins("3rrr_m1", goal="x=0,y=0,phi=0", grid="x=5:6:2,y=0,phi=0")

@@ -28,6 +28,7 @@ from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.locked_twists import joint_at
 from hrsynth.mechanism.model import Limits
 from hrsynth.present.text.equilibria import endings as text
+from hrsynth.simulation.equilibria.completeness import CompletenessProof
 from hrsynth.simulation.equilibria.critical_poses import CriticalPoses, PoseToJoints, _held_sets, critical_poses
 from hrsynth.simulation.equilibria.descent import CriticalPoint, Tangents, descend, walk_at_random
 from hrsynth.simulation.equilibria.enclosure import _rates, enclose_points
@@ -38,7 +39,6 @@ from hrsynth.simulation.equilibria.exhaustive_search import cover, reachable_box
 from hrsynth.simulation.equilibria.pose_error import PoseError
 from hrsynth.simulation.equilibria.pose_system import LegSystem
 from hrsynth.simulation.equilibria.search import DistinctPoints, anywhere, starts
-from hrsynth.simulation.equilibria.subdivision import CompletenessProof
 from hrsynth.simulation.law import FixedDirections, directions
 from hrsynth.simulation.run import Loop
 from oracle import Oracle
@@ -51,7 +51,7 @@ FIVE_BAR, POSE = "rrrrr_m1", "x=0.02,y=0.25"
 
 @cache
 def listed(name: str = FIVE_BAR, pose: str = POSE) -> Equilibria:
-    return equilibria(name, at=pose)
+    return equilibria(name, goal=pose)
 
 
 def test_without_a_pose_the_goal_is_the_zero_configuration(monkeypatch: pytest.MonkeyPatch):
@@ -59,7 +59,7 @@ def test_without_a_pose_the_goal_is_the_zero_configuration(monkeypatch: pytest.M
     found, robot = equilibria(FIVE_BAR), hrsynth.observe(FIVE_BAR)
     zero = robot.all_samples.start
     assert all(np.allclose(found.goal.pose(link), zero.pose(link), atol=1e-12) for link in robot.mechanism.links)
-    there = equilibria(FIVE_BAR, at=str(robot.motion.pose(zero.pose(robot.motion.link))))
+    there = equilibria(FIVE_BAR, goal=str(robot.motion.pose(zero.pose(robot.motion.link))))
     assert np.allclose(np.array(found.desired), np.array(there.desired), atol=1e-9)
 
 
@@ -337,7 +337,7 @@ def test_what_is_said_to_be_all_is_what_boxes_prove(name: str) -> None:
         assert counted_from.motion.goal(missing.pose).is_met(each.configuration.pose(counted_from.motion.link), 1e-6)
         assert missing.stability == each.stability
         assert missing.error[0] - 1e-9 <= each.error <= missing.error[1] + 1e-9
-        assert f"{missing.stability} at {missing.pose}" in text(replace(found, completeness=short))
+        assert f"{missing.stability} at {missing.pose}" in text(replace(found, subdivision=short))
     twice = covers.judge([*found.points, replace(found.points[0], configuration=nearby(found, found.points[0]))])
     assert twice is not None
     assert (twice.only_found, twice.complete) == (1, False)
@@ -386,7 +386,7 @@ def test_nothing_is_enclosed_beside_a_rest() -> None:
 @pytest.mark.slow
 def test_what_is_alone_in_its_box_may_share_its_pose() -> None:
     """A rod may point either way at one pose: two rests there, whose boxes of joint coordinates are far apart."""
-    found = equilibria("rprpr_m2", at="x=0.03,y=0.22")
+    found = equilibria("rprpr_m2", goal="x=0.03,y=0.22")
     scale = found.setup.mechanism.length
     same = [
         (one, other)
@@ -587,10 +587,10 @@ def seen(points: np.ndarray, link: str = "platform") -> list[str]:
     return [f"point:{link}@{x},{y},{z}" for x, y, z in points]
 
 
-def body(folder: Path, see: list[str], **options: Any) -> Equilibria:
+def body(folder: Path, sensor: list[str], **options: Any) -> Equilibria:
     """The endings of a body that nothing holds before a camera."""
     (folder / "body.urdf").write_text(BODY)
-    return equilibria(folder / "body.urdf", see=see, camera="eye=base@0,0,0", **options)
+    return equilibria(folder / "body.urdf", sensor=sensor, camera="eye=base@0,0,0", **options)
 
 
 def pulled(x: np.ndarray, at: np.ndarray, wanted: np.ndarray) -> np.ndarray:
@@ -652,9 +652,9 @@ def test_four_image_points_of_a_tilted_square(tmp_path: Path) -> None:
     ],
     ids=["circle and distance", "edges", "inclination, position and direction"],
 )
-def test_rests_of_all_kinds_are_those_of_the_law(see: list[str], tmp_path: Path) -> None:
+def test_rests_of_all_kinds_are_those_of_the_law(sensor: list[str], tmp_path: Path) -> None:
     """The law commands nothing there, and from next to one that attracts a run ends at it."""
-    found = body(tmp_path, see, at=TILTED)
+    found = body(tmp_path, sensor, at=TILTED)
     assert found.points[0].kind == "goal"
     assert all(each.stable and each.proved for each in found.points if each.error < 1e-9)
     search = EquilibriumSearch.of(found.setup, found.goal)
@@ -676,8 +676,8 @@ def test_rests_of_all_kinds_are_those_of_the_law(see: list[str], tmp_path: Path)
 @pytest.mark.parametrize(("depth", "mixed"), [("desired", False), ("constant:1", True)])
 def test_rests_with_supposed_depths_are_those_of_the_law(depth: str, mixed: bool, tmp_path: Path) -> None:
     """There the law commands nothing, and its differences have the eigenvalues that are told."""
-    see = ["image_line:platform@0.1,0,0/0,1,0", "distance:platform@0,0.1,0"] if mixed else []
-    found = body(tmp_path, seen(SQUARE[: 3 if mixed else 4]) + see, at=TILTED, depth=depth)
+    sensor = ["image_line:platform@0.1,0,0/0,1,0", "distance:platform@0,0.1,0"] if mixed else []
+    found = body(tmp_path, seen(SQUARE[: 3 if mixed else 4]) + sensor, at=TILTED, depth=depth)
     search = EquilibriumSearch.of(found.setup, found.goal, depth)
     assert found.points[0].kind == "goal"
     assert not any(each.proved for each in found.points)
@@ -701,7 +701,7 @@ def test_what_cannot_be_asked_of_cameras_is_refused_in_one_line(tmp_path: Path) 
         with pytest.raises(BadRequest, match=said):
             body(tmp_path, seen(SQUARE), **options)
     with pytest.raises(BadRequest, match="a camera to which nothing is given to see"):
-        equilibria(FIVE_BAR, camera="eye=base@0,0,0", at=POSE)
+        equilibria(FIVE_BAR, camera="eye=base@0,0,0", goal=POSE)
 
 
 @pytest.mark.parametrize(
@@ -728,7 +728,7 @@ def test_rests_within_the_limits_of_joints_are_counted(reach: float) -> None:
     robot = hrsynth.load(FIVE_BAR)
     motors = [joint for joint in robot.joints.values() if joint.actuated]
     found = equilibria(
-        robot.changed(joints=[replace(joint, limits=Limits(-reach, reach)) for joint in motors]), at=POSE
+        robot.changed(joints=[replace(joint, limits=Limits(-reach, reach)) for joint in motors]), goal=POSE
     )
     turns = [
         [each.configuration.q[list(each.configuration.model.coordinates[joint.name])] for joint in motors]
@@ -744,7 +744,7 @@ def test_rests_within_the_limits_of_joints_are_counted(reach: float) -> None:
 @pytest.mark.slow
 def test_rests_whose_rows_would_be_equal_are_one_row_with_their_number() -> None:
     """Where rods may point either way a pose has two rests, with equal rows if working modes are not known."""
-    found = hrsynth.equilibria("rprpr_m2", at="x=0.03,y=0.22")
+    found = hrsynth.equilibria("rprpr_m2", goal="x=0.03,y=0.22")
     told = replace(found, points=tuple(replace(each, legs_in_other_mode=None, side=None) for each in found.points))
     pairs = [
         number

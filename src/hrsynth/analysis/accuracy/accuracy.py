@@ -118,7 +118,7 @@ def accuracy(
     observe: LegsLike = None,
     camera: CameraLike = None,
     *,
-    see: SeeLike = None,
+    sensor: SeeLike = None,
     cone: Annotated[
         Cones | None,
         option(
@@ -163,7 +163,7 @@ def accuracy(
     platform comes to rest where ``servo`` does; poses of a grid at which something is not in front of its camera are
     left out. ``nonlinear`` true errors are tried at each single pose, in a grid at its worst poses. ``into`` a file
     .npy, the errors (m, rad) of a plane or grid of any size are written part by part; the same call continues an
-    interrupted sweep. ``observe``, ``camera`` and ``see`` are as for ``derive``.
+    interrupted sweep. ``observe``, ``camera`` and ``sensor`` are as for ``derive``.
 
     Raises ``BadRequest`` for unknown names, for invalid cones, if not every freedom is seen (the error is infinite
     everywhere) or something is behind its camera; ``PoseNotReached``, ``NoReachablePose``.
@@ -186,7 +186,7 @@ def accuracy(
             raise BadRequest("samples at the worst poses of a file", nonlinear, "samples at single poses")
     held = None if plane is None else as_pose(plane)
     cells = None if grid is None else Grid.parse(grid, LARGEST_FIELD if into is None else LARGEST_SWEEP)
-    setup = ObservedRobot.of(robot, observe, camera, see=see, seed=seed).telling(wanted)
+    setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed).telling(wanted)
     blur = MeasurementBounds.of(cone, noise, setup.observed)
     sees_all(setup)
     mapper = Mapper(setup, blur)

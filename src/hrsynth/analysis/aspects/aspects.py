@@ -154,7 +154,7 @@ class AspectTable(Result, shown_as="aspects"):
     80,
     examples=(
         "quattro --observe 1,4",
-        "3rrr_m1 --observe 2,1,3 -o atlas.png",
+        "3rrr_m1 --observe 2,1,3 -o aspects.png",
     ),
 )
 def aspects(
@@ -162,7 +162,7 @@ def aspects(
     observe: LegsLike = None,
     camera: CameraLike = None,
     *,
-    see: SeeLike = None,
+    sensor: SeeLike = None,
     at: Annotated[
         PoseLike | ClosedConfiguration | None,
         option(
@@ -184,7 +184,7 @@ def aspects(
     >>> hrsynth.aspects("rrrrr_m1")
     <Atlas: rrrrr_m1, watching 1, 2: 2 real of 2 complex (hidden robot) at x=0.02,y=0.24,z=0,phi=0deg, aspects: 2>
     """
-    listed = modes(robot, observe, camera, see=see, at=at, seed=seed)
+    listed = modes(robot, observe, camera, sensor=sensor, at=at, seed=seed)
     aspects = PathPlanner.of(listed.setup, seed=seed)
     places = tuple(_place(listed, number) for number in range(1, len(listed.modes) + 1))
     answers: dict[tuple[int, int], PathAnswer] = {}

@@ -201,11 +201,11 @@ class PathPlanner(Value):
         observe: LegsLike = None,
         camera: CameraLike = None,
         *,
-        see: SeeLike = None,
+        sensor: SeeLike = None,
         seed: int = 0,
     ) -> PathPlanner:
         """The condition of a robot from random samples of its motion."""
-        setup = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
+        setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed)
         seen = MeasuredRobot.of_directions(setup)
         return cls(
             setup, setup.motion, seen.pattern, seen.condition, seen.verdict.never if seen.verdict.unobserved else ""
@@ -481,11 +481,9 @@ def path(
     observe: LegsLike = None,
     camera: CameraLike = None,
     *,
-    see: SeeLike = None,
+    sensor: SeeLike = None,
     start: StartPose,
-    goal: Annotated[
-        PoseLike, option("Goal pose; mode:2 is a mode with the directions at the start.", "POSE", old=("--to",))
-    ],
+    goal: Annotated[PoseLike, option("Goal pose; mode:2 is a mode with the directions at the start.", "POSE")],
     seed: Seed = 0,
     budget: int = BUDGET,
 ) -> PathAnswer:
@@ -502,7 +500,7 @@ def path(
     condition away from zero, the reach of every leg and the limits of R and P joints all along the path, for all poses
     within ``tolerances.FOLLOWED`` of it. Opposite signs of an expression, at the start and in all working modes of the
     goal that joint limits allow, separate the two. At most ``budget`` intervals are tried. If nothing can be enclosed
-    the straight path is sampled. ``observe``, ``camera`` and ``see`` are as for ``derive``.
+    the straight path is sampled. ``observe``, ``camera`` and ``sensor`` are as for ``derive``.
 
     Raises ``BadRequest`` for unknown names and parts of a pose, ``PoseNotReached``.
 
@@ -510,7 +508,7 @@ def path(
     <PathAnswer: 3rrr_m1, watching 1, 2, 3: same aspect>
     """
     wanted = [asked_pose(each) for each in (start, goal)]
-    setup = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
+    setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed)
     return between_poses(setup, wanted, any_mode=isinstance(wanted[1], Pose), seed=seed, budget=budget)
 
 

@@ -48,7 +48,7 @@ Cells = Annotated[int, option("Most cells to try for each part of the loops.", "
     examples=("rrrrr_m1 --box shoulder_1=-0.2:0.2,shoulder_2=-0.2:0.2",),
     seeded=False,
 )
-def branch(robot: RobotLike, box: MotorBox = None, *, effort: Cells = BRANCH_CELLS) -> BranchProof:
+def branch(robot: RobotLike, box: MotorBox = None, *, max_cells: Cells = BRANCH_CELLS) -> BranchProof:
     """Where the joints are proved to be one function of the motors, on the branch of the zero configuration, and where
     that ends.
 
@@ -56,7 +56,7 @@ def branch(robot: RobotLike, box: MotorBox = None, *, effort: Cells = BRANCH_CEL
     configuration (docs/pages/branch.md).
 
     ``box`` gives the motors' intervals (m, rad), as a mapping or as text ``hip=-1:1,slide=0:0.2``; the default is the
-    file's limits or, without them, a whole turn, or a characteristic length either way. ``effort`` is the largest
+    file's limits or, without them, a whole turn, or a characteristic length either way. ``max_cells`` is the largest
     number of cells to try for each part of the loops.
 
     Raises ``MotorsNotEnough`` if the motors do not determine the platform at the zero configuration, ``BadRequest`` for
@@ -65,8 +65,8 @@ def branch(robot: RobotLike, box: MotorBox = None, *, effort: Cells = BRANCH_CEL
     >>> hrsynth.branch("rrrrr_m1", {"shoulder_1": (-0.05, 0.05), "shoulder_2": (-0.05, 0.05)})
     <BranchProof: rrrrr_m1, 2 motors, 2 passive coordinates: shoulder_1, shoulder_2: 100 % of the box proved, 1 cell>
     """
-    if effort < 1:
-        raise BadRequest("effort", effort, "1 cell or more")
+    if max_cells < 1:
+        raise BadRequest("max_cells", max_cells, "1 cell or more")
     given = as_robot(robot)
     mechanism = given if isinstance(given, Mechanism) else given.robot
     mechanism.require_platform()
@@ -81,7 +81,9 @@ def branch(robot: RobotLike, box: MotorBox = None, *, effort: Cells = BRANCH_CEL
     for part in parts:
         grid, coarsest = _grid(part, intervals), COARSEST_BRANCH_CELL * _reach(part, intervals)
         q0, x0 = (system.zero[list(places)] for places in (part.driven, part.unknowns))
-        growth = Growth(part, grid, q0, x0, _depth(part), effort, coarsest, _first(grid, q0, coarsest, effort)).run()
+        growth = Growth(
+            part, grid, q0, x0, _depth(part), max_cells, coarsest, _first(grid, q0, coarsest, max_cells)
+        ).run()
         grown.append(growth)
         found.append(_answer(part, growth))
         report("parts")
@@ -138,14 +140,14 @@ def _reach(part: LoopPart, intervals: Mapping[int, tuple[float, float]]) -> floa
     return max((float(size) for size, tube in zip(sizes, tubes, strict=True) if tube is not None), default=0.0)
 
 
-def _first(grid: CellGrid, zero: Array, coarsest: float, effort: int) -> list[GrownCell]:
+def _first(grid: CellGrid, zero: Array, coarsest: float, max_cells: int) -> list[GrownCell]:
     """The cells to begin with: the box, or, where the effort is spent before cells that are not too coarse fill it, as
     many as it allows of those that are proved about zero."""
     n = len(grid.low)
-    if not coarsest or coarsest**n * effort >= 1:
+    if not coarsest or coarsest**n * max_cells >= 1:
         return whole_box(n)
     half = coarsest / COARSEST_BRANCH_CELL * np.minimum(grid.high - grid.low, 2 * np.pi) / 2
-    return lattice(grid, zero, half, effort)
+    return lattice(grid, zero, half, max_cells)
 
 
 def _depth(part: LoopPart) -> int:

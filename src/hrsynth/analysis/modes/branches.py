@@ -142,15 +142,18 @@ def choices(confined: TipLoci) -> Iterator[TipLoci]:
         yield replace(confined, tips=tips, error=confined.error * max(gain for _, gain in chosen))
 
 
-def solve_all(confined: TipLoci, *, near: bool = True, effort: float = EFFORT) -> tuple[Model, SystemModes]:
+def solve_all(confined: TipLoci, *, near: bool = True, time_limit: float = EFFORT) -> tuple[Model, SystemModes]:
     """The goal's own system, and the modes of all choices of branches together, each pose once; of those as many as
-    ``effort`` (s, by their size) allows. Raises ``TooLarge`` where it allows none."""
+    ``time_limit`` (s, by their size) allows. Raises ``TooLarge`` where it allows none."""
     first = model(next(choices(confined))).system
-    if first.seconds > effort:
+    if first.seconds > time_limit:
         raise TooLarge(
-            "a system of equations", f"{len(first.curves)} legs and {first.freedoms} freedoms", first.seconds, effort
+            "a system of equations",
+            f"{len(first.curves)} legs and {first.freedoms} freedoms",
+            first.seconds,
+            time_limit,
         )
-    most = int(min(BRANCH_CHOICES, effort / first.seconds))
+    most = int(min(BRANCH_CHOICES, time_limit / first.seconds))
     made = [model(each) for each in islice(choices(confined), most)]
     size = made[0].system.size
     found = [
@@ -164,7 +167,7 @@ def solve_all(confined: TipLoci, *, near: bool = True, effort: float = EFFORT) -
     if total > len(made):
         doubts.append(
             f"only {len(made)} of {total} choices of the legs' branches were solved: all would need about "
-            f"{total * first.seconds:g} s, and the effort is {effort:g} s"
+            f"{total * first.seconds:g} s, and the effort is {time_limit:g} s"
         )
     if doubts and modes.continuous_family is None:
         proof = f"{modes.proof}; there may be other branches ({'; '.join(doubts)})"

@@ -81,7 +81,7 @@ def better_ways(made: Model) -> tuple[Any, ...]:
 
 
 def solve_tips(
-    measured: MeasuredRobot, goal: ClosedConfiguration, exact: float, as_written: bool, effort: float
+    measured: MeasuredRobot, goal: ClosedConfiguration, exact: float, as_written: bool, time_limit: float
 ) -> tuple[Model, SystemModes]:
     """All modes by where the tips of the legs can be, with the goal known to ``exact`` (m)."""
     confined, seen = all_loci(measured, goal)
@@ -95,7 +95,7 @@ def solve_tips(
         + max([*(tip.moved for tip in confined.tips), *(angle.moved for angle in confined.angles)]),
         as_written=as_written,
     )
-    return solve_all(confined, effort=effort)
+    return solve_all(confined, time_limit=time_limit)
 
 
 def expected_modes(measured: MeasuredRobot, at: ClosedConfiguration) -> int:

@@ -236,7 +236,7 @@ def modes(
     observe: LegsLike = None,
     camera: CameraLike = None,
     *,
-    see: SeeLike = None,
+    sensor: SeeLike = None,
     at: Annotated[
         PoseLike | ClosedConfiguration | None,
         option(
@@ -251,7 +251,7 @@ def modes(
         option("Error of a measurement: poses that differ by no more are near modes; 0 for none.", "ANGLE"),
     ] = MEASUREMENT_BOUND,
     as_written: bool = False,
-    effort: Annotated[
+    time_limit: Annotated[
         float,
         option(
             "Time limit for a list (estimated seconds on one core); what needs more is left out, and reported.",
@@ -269,10 +269,10 @@ def modes(
     A Π stays a parallelogram, never crossed (except in planar mechanisms that are closed loop by loop, and in
     searches); if legs or measurements keep the platform from turning, turned poses (another operation mode) are not
     searched for. Poses that a measurement with an error up to ``cone`` (rad, or as ``"0.1deg"``; 0 for none) does not
-    tell from the goal are listed too, as ``near``: found, not proved. ``observe``, ``camera`` and ``see`` are as for
+    tell from the goal are listed too, as ``near``: found, not proved. ``observe``, ``camera`` and ``sensor`` are as for
     ``derive``; ``at`` may be a closed configuration of an observed robot. Joint centres that nearly coincide, and
     solutions nearly at infinity, are taken to be so if that is clearly meant, unless ``as_written`` is true.
-    ``effort`` is the time limit for a list (seconds on one core), estimated from its size before it starts. For a
+    ``time_limit`` is the time limit for a list (seconds on one core), estimated from its size before it starts. For a
     formation: all configurations, trivial motions aside, with what is measured at the zero configuration.
 
     If the tips' paths are of no known kind, or the solver that they need gives up or is not installed, the whole robot
@@ -286,12 +286,12 @@ def modes(
     >>> hrsynth.modes("3rrr_m1", at="x=0,y=0,phi=0")
     <AssemblyModes: 3rrr_m1, watching 1, 2, 3: 2 real of 6 complex (hidden robot) at x=0,y=0,z=0,phi=0deg>
     """
-    if real and (observe not in (None, "all", ["all"]) or see is not None):
+    if real and (observe not in (None, "all", ["all"]) or sensor is not None):
         raise BadRequest(
-            "the motors are held instead of what is observed", f"real with {observe or see}", "one of the two"
+            "the motors are held instead of what is observed", f"real with {observe or sensor}", "one of the two"
         )
     bound = measurement_bound(cone)
-    setup = ObservedRobot.of(robot, observe, camera, see=see, seed=seed, driven=real)
+    setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed, driven=real)
     if setup.robot.formation:
         return _modes_of_formation(setup, at, real)
     asked = None if at is None or isinstance(at, ClosedConfiguration) else asked_pose(at)
@@ -306,7 +306,7 @@ def modes(
         wanted = motion.goal(asked, setup.robot.name)
         goal = reach(goal, setup.all_samples.observation_model, asked, motion)
     measured = MeasuredRobot.of(setup, real)
-    found = _list_modes(setup, measured, goal, wanted, real, as_written, effort)
+    found = _list_modes(setup, measured, goal, wanted, real, as_written, time_limit)
     near = near_modes(setup, goal, measured.observation_model, found.modes, found.candidates, bound)
     return replace(found, candidates=(), near_modes=near, measurement_bound=bound)
 
@@ -318,7 +318,7 @@ def _list_modes(
     wanted: Task | None,
     real: bool,
     as_written: bool,
-    effort: float,
+    time_limit: float,
 ) -> AssemblyModes:
     """The modes of the numbers as they are, and where near ones are sought."""
     motion = setup.motion
@@ -343,7 +343,7 @@ def _list_modes(
             return _modes_by_search(
                 setup, measured.observation_model, goal, pose, kind, "the pose lies on a self-motion"
             )
-        listed = _modes_by_system(setup, measured, goal, wanted, pose, kind, as_written, effort)
+        listed = _modes_by_system(setup, measured, goal, wanted, pose, kind, as_written, time_limit)
     except (UnsupportedLocus, SystemNotSolved, TooLarge, MissingExtra) as error:
         return _modes_by_search(setup, measured.observation_model, goal, pose, kind, error.reason)
     moving = (
@@ -509,7 +509,7 @@ def _modes_by_system(
     pose: Pose,
     kind: str,
     as_written: bool,
-    effort: float,
+    time_limit: float,
 ) -> AssemblyModes:
     """The modes as the solutions of the system that the tips' curves and surfaces give, or else of the conditions that
     the legs' joints give."""
@@ -517,7 +517,10 @@ def _modes_by_system(
     answers = list[tuple[Model, SystemModes]]()
     exact, better = drift(goal, wanted, setup.normal.moved), None
     free = without_couplings(measured, goal)
-    tips, asked = partial(solve_tips, as_written=as_written, effort=effort), partial(solve_posed, effort=effort)
+    tips, asked = (
+        partial(solve_tips, as_written=as_written, time_limit=time_limit),
+        partial(solve_posed, time_limit=time_limit),
+    )
     first = (tips, asked, solve_loops) if free is None else (solve_loops, tips, asked)
     for listed in (*first, solve_carried, solve_loop):
         if better is not None and listed not in better:

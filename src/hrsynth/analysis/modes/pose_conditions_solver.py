@@ -150,10 +150,10 @@ def most_posed(measured: MeasuredRobot, goal: ClosedConfiguration) -> int:
 
 
 def solve_posed(
-    measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0, effort: float = EFFORT
+    measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0, time_limit: float = EFFORT
 ) -> tuple[Model, SystemModes]:
     """All modes of all choices of branches together, with the goal known to ``error`` (m). Raises ``UnsupportedLocus``,
-    and ``Unsolved`` where not all poses are enclosed that there may be, or the choices need more than ``effort``
+    and ``Unsolved`` where not all poses are enclosed that there may be, or the choices need more than ``time_limit``
     (s)."""
     systems = [
         replace(each, error=each.error + max([error, *(sight.error(error, goal) for sight in each.seen)]))
@@ -172,11 +172,11 @@ def solve_posed(
     )
     forms, found = _forms(measured, first), list[SystemModes]()
     needed = len(systems) * (FEW_FORMS_SECONDS + FORMS_SECONDS * (forms.size / LARGEST_FORMS) ** 3)
-    if needed > max(effort, FEW_FORMS_SECONDS * (len(systems) == 1)):
+    if needed > max(time_limit, FEW_FORMS_SECONDS * (len(systems) == 1)):
         raise SystemNotSolved(
             "conditions on the pose",
             f"{len(systems)} choices of branches, {forms.size} forms each, need "
-            f"about {needed:.2g} s: too many (the effort is {effort:g} s)",
+            f"about {needed:.2g} s: too many (the effort is {time_limit:g} s)",
         )
     for system in systems:
         found.append(_judge(system, _forms(measured, system), system is first))

@@ -78,7 +78,7 @@ def locus(
     observe: Sequence[str] | str | None = None,
     camera: CameraLike = None,
     *,
-    see: SeeLike = None,
+    sensor: SeeLike = None,
     plane: Pose | str | None = None,
     steps: int = STEPS,
     seed: int = 0,
@@ -88,7 +88,7 @@ def locus(
     ``plane`` fixes parts of the pose so that two are left; a robot that is only partially controllable has no locus
     (``BadRequest``). Raises ``NoReachablePose`` where no pose of the plane is reached.
     """
-    setup = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
+    setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed)
     hidden = _controllable(setup)
     real = None
     if any(joint.actuated for joint in setup.mechanism.joints.values()):

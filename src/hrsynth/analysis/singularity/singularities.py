@@ -140,7 +140,7 @@ def singularities(
     observe: LegsLike = None,
     camera: CameraLike = None,
     *,
-    see: SeeLike = None,
+    sensor: SeeLike = None,
     real: Annotated[bool, option("Ask about the real robot with its own motors instead of the hidden one.")] = False,
     points: Annotated[
         int, option("Number of random poses at which the condition is checked.", low=1, high=10_000_000)
@@ -159,7 +159,7 @@ def singularities(
     >>> hrsynth.singularities("rrrrr_m1", points=200)
     <Singularity: rrrrr_m1, watching 1, 2: the tangents τ1, τ2 are parallel>
     """
-    setup = ObservedRobot.of(robot, observe, camera, see=see, seed=seed, driven=real)
+    setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed, driven=real)
     measured = MeasuredRobot.of(setup, real)
     observation_model, verdict = measured.observation_model, measured.verdict
     if not verdict.dof:

@@ -106,7 +106,7 @@ RULES = (
         "note",
         "a closure that other programs do not read",
         "The file loads there as an open tree: it falls apart in simulation, and its Jacobians are those of "
-        "another robot. With --reader NAME only that program is considered.",
+        "another robot. With --program NAME only that program is considered.",
         "write the file in a dialect that the program reads: hrsynth convert IN OUT.xml for MuJoCo, OUT.sdf for "
         "Gazebo Classic, OUT.yaml for Gepetto's tools",
         _dropped,

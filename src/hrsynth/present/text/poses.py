@@ -508,7 +508,7 @@ def road(found: SampledRoute, value: str) -> list[str]:
 _SIGNS = {SAME: "=", SEPARATED: "|", UNDECIDED_PAIR: "?"}
 
 
-def atlas(found: AspectTable) -> str:
+def aspects(found: AspectTable) -> str:
     """The modes, how many aspects hold them, the table mode by mode, and what was asked of which pairs."""
     listed = found.listed
     rows = [*head(listed.setup), ("held", f"{_describe_held(listed)} at {listed.pose}")]

@@ -48,7 +48,7 @@ _KINDS = {
     "direction": "direction of another link",
     "line": "position of an observed line",
     "encoder": "encoder on a joint",
-    "offered": "--see",
+    "offered": "--sensor",
 }
 _SHOWN = 6
 """Sets of measurements listed at most."""
@@ -422,8 +422,8 @@ def _singular(found: Advice) -> list[str]:
         return []
     which = "all of these" if len(fewer) == len(found.sets) else f"{len(fewer)} of these"
     more = "" if len(fewer) <= _SHOWN else f"  and {len(fewer) - _SHOWN} more (rank_at_zero with --json)"
-    see = "sees fewer freedoms" if len(fewer) == 1 else "see fewer freedoms"
-    title = f"{which} {see} at the zero configuration, a Type 2 singularity with them:"
+    sensor = "sees fewer freedoms" if len(fewer) == 1 else "see fewer freedoms"
+    title = f"{which} {sensor} at the zero configuration, a Type 2 singularity with them:"
     return (
         [title]
         if len(fewer) == len(found.sets)
@@ -436,14 +436,14 @@ def _options_that_ask(found: Advice) -> list[str]:
     if not all(each.by_segment for each in found.setup.observed):
         return []
     for each in sorted(found.sets, key=lambda each: each.verdict.rank_at_zero is not None):
-        see = [m.of if m.kind == "offered" else f"encoder:{m.of}" for m in each.measurements if m.kind != "leg"]
+        sensor = [m.of if m.kind == "offered" else f"encoder:{m.of}" for m in each.measurements if m.kind != "leg"]
         if all(
             m.kind in ("leg", "offered")
             or (m.kind == "encoder" and m.of in found.setup.robot.joints and m.axis is None)
             for m in each.measurements
         ):
             legs = ",".join([*found.setup.labels, *(m.of for m in each.measurements if m.kind == "leg")])
-            return ["for other commands: " + " ".join([f"--observe {legs}", *(f"--see {text}" for text in see)])]
+            return ["for other commands: " + " ".join([f"--observe {legs}", *(f"--sensor {text}" for text in sensor)])]
     return []
 
 

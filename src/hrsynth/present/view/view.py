@@ -148,7 +148,7 @@ def view(
     observe: LegsLike = None,
     camera: CameraLike = None,
     *,
-    see: SeeLike = None,
+    sensor: SeeLike = None,
     hidden: Annotated[bool, option("Show the hidden robot too, its virtual actuators highlighted.")] = False,
     seed: Seed = 0,
 ) -> View:
@@ -157,7 +157,7 @@ def view(
     A 3D view of a robot, with ``hidden`` also of its hidden robot: every position of a slider is a closed
     configuration in which only one of the platform's coordinates differs from the zero configuration.
 
-    ``observe``, ``camera`` and ``see`` are as for ``derive``, which also says what is raised; without ``hidden``
+    ``observe``, ``camera`` and ``sensor`` are as for ``derive``, which also says what is raised; without ``hidden``
     neither a platform nor a segment is needed: the first link that could be the platform is moved, and ``notes`` say
     so. Assembly modes that cannot be listed and missing meshes are reported in ``notes``.
 
@@ -168,7 +168,7 @@ def view(
     if isinstance(robot, Mechanism) and robot.open_platform and not hidden:
         notes = (f"the sliders move link {robot.platform!r}: {robot.choice}",)
         robot = replace(robot, choice=PlatformChoice("guess", "the first that could be"))
-    setup = ObservedRobot.of(robot, observe, camera, see=see, seed=seed, blind=not hidden)
+    setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed, blind=not hidden)
     derivation = derive(setup, seed=seed) if hidden else None
     other = None if derivation is None else derivation.hidden
     mover = Mover.of(setup, other)

@@ -100,7 +100,7 @@ class Basins(Result, shown_as="basins"):
     continue, and of ``checked`` others ``agreed`` ended at the same pose."""
 
     setup: Annotated[ObservedRobot, FLAT]
-    goal: Annotated[Pose, As("to")]
+    goal: Recorded[Pose]
     target: ClosedConfiguration
     grid: Grid
     ends: Recorded[tuple[BasinEnd, ...]]
@@ -189,8 +189,8 @@ class Basins(Result, shown_as="basins"):
 @analysis(
     120,
     examples=(
-        "quattro --observe 1,4 --to z=-0.7 --plane z=-0.7,phi=0 -o basins.png",
-        "3rrr_m1 --to x=0,y=0,phi=0 --grid x=-0.1:0.1:50,y=0,phi=0",
+        "quattro --observe 1,4 --goal z=-0.7 --plane z=-0.7,phi=0 -o basins.png",
+        "3rrr_m1 --goal x=0,y=0,phi=0 --grid x=-0.1:0.1:50,y=0,phi=0",
     ),
 )
 def basins(
@@ -198,8 +198,8 @@ def basins(
     observe: LegsLike = None,
     camera: CameraLike = None,
     *,
-    see: SeeLike = None,
-    to: Annotated[PoseLike, option("Pose whose measurements are desired.", "POSE")],
+    sensor: SeeLike = None,
+    goal: Annotated[PoseLike, option("Pose whose measurements are desired.", "POSE")],
     plane: Annotated[
         PoseLike | None,
         option(
@@ -222,29 +222,29 @@ def basins(
 ) -> Basins:
     """Where the servo loop to a goal ends, from each start of a line, plane or box of poses.
 
-    Where the loop ends that servoes what is observed at the pose ``to``, from each start of a plane of poses (by
+    Where the loop ends that servoes what is observed at the pose ``goal``, from each start of a plane of poses (by
     default one through the goal, as far as it is reached, ``steps`` poses a side) or of a ``grid``, a line, plane or
     box such as ``x=-0.3:0.3:50,y=-0.3:0.3:50,z=-0.7``.
 
-    ``observe``, ``camera`` and ``see`` are as for ``derive``. The law is that of ``servo`` with exact measurements (and
-    a ``depth``). Robots whose legs have closed forms and are watched by their directions are integrated together,
+    ``observe``, ``camera`` and ``sensor`` are as for ``derive``. The law is that of ``servo`` with exact measurements
+    (and a ``depth``). Robots whose legs have closed forms and are watched by their directions are integrated together,
     others one by one. There are ``jobs`` processes, by default one per core; the answer does not depend on their
     number.
 
     Raises ``BadRequest`` for unknown names, legs that do not see the platform, a singular goal, too many starts;
     ``PoseNotReached``, ``NoReachablePose`` for poses out of reach.
 
-    >>> hrsynth.basins("3rrr_m1", to="x=0,y=0,phi=0", grid="x=-0.02:0.02:5,y=-0.02:0.02:5,phi=0")
+    >>> hrsynth.basins("3rrr_m1", goal="x=0,y=0,phi=0", grid="x=-0.02:0.02:5,y=-0.02:0.02:5,phi=0")
     <Basins: 3rrr_m1, watching 1, 2, 3: 100 % of 25 starts end at the goal x=0,y=0,z=0,phi=0deg>
     """
-    setup = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
-    asked = asked_pose(to)
+    setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed)
+    asked = asked_pose(goal)
     setup = setup.telling([asked])
     if plane is not None and grid is not None:
         raise BadRequest("basins: both a plane and a grid are given", str(grid), "one of them")
-    (goal,) = configurations_at(setup, [asked])
-    task = ServoTask.between(setup, goal, goal, Conditions(depth=depth))
-    search = BasinSearch(setup, goal, task, jobs or os.cpu_count() or 1)
+    (target,) = configurations_at(setup, [asked])
+    task = ServoTask.between(setup, target, target, Conditions(depth=depth))
+    search = BasinSearch(setup, target, task, jobs or os.cpu_count() or 1)
     return search.over(search.plane(plane, steps) if grid is None else Grid.parse(grid, FLOW_STARTS), seed)
 
 

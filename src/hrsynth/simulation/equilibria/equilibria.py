@@ -59,8 +59,8 @@ NEARBY = 0.02
 @analysis(
     110,
     examples=(
-        "3rrr_m1 --at x=0.02,y=0,phi=10deg",
-        "quattro --observe 1,4 --at x=0.05,y=0.1,z=-0.7 -o endings.png",
+        "3rrr_m1 --goal x=0.02,y=0,phi=10deg",
+        "quattro --observe 1,4 --goal x=0.05,y=0.1,z=-0.7 -o equilibria.png",
     ),
 )
 def equilibria(
@@ -68,8 +68,8 @@ def equilibria(
     observe: LegsLike = None,
     camera: CameraLike = None,
     *,
-    see: SeeLike = None,
-    at: Annotated[
+    sensor: SeeLike = None,
+    goal: Annotated[
         PoseLike | None,
         option(
             "The goal: pose whose measurements are desired, such as x=0.02,y=0.1,z=-0.7; or mode:2 "
@@ -79,7 +79,7 @@ def equilibria(
     ] = None,
     depth: Depth = "exact",
     complete: Annotated[bool, option("Try to prove that the list is complete, by boxes of platform poses.")] = False,
-    effort: Annotated[
+    max_boxes: Annotated[
         int, option("Most boxes of poses to look at (10,000 to 40,000 take a second).", "COUNT", low=1)
     ] = COVER_BOXES,
     jobs: Jobs = None,
@@ -88,36 +88,36 @@ def equilibria(
     """Poses at which the servo loop can rest, and which of them attract: the goal, modes, antipodal poses,
     critical poses of the error.
 
-    Poses at which the loop can rest that servoes what is observed at ``at`` (default: the zero configuration): the
+    Poses at which the loop can rest that servoes what is observed at ``goal`` (default: the zero configuration): the
     goal, modes and antipodal poses, where the error vanishes, and critical poses, where it does not; and which of them
     attract.
 
-    ``observe``, ``camera`` and ``see`` are as for ``derive``; each kind of observation has its error. The law rests
+    ``observe``, ``camera`` and ``sensor`` are as for ``derive``; each kind of observation has its error. The law rests
     exactly at the critical points of ½ ‖e‖² on the closed loops (theory.md 11); those at which a camera does not see
     what it has to see are left out. They are sought from random walks on the branch of the zero configuration.
     ``complete``: try to prove that they are all, by subdivision of a box of platform poses (seconds to minutes) into
-    ``effort`` boxes at most; where these are many, so many processes share them (``jobs``, by default one per core), on
-    whose number no answer depends.
-    ``depth`` is that of ``servo``; if the law assumes depths, its command is not a gradient, and rests are only found.
+    ``max_boxes`` boxes at most; where these are many, so many processes share them (``jobs``, by default one per core),
+    on whose number no answer depends. ``depth`` is that of ``servo``; if the law assumes depths, its command is not a
+    gradient, and rests are only found.
 
     Raises ``BadRequest`` for unknown names, observations that do not see the platform, a singular goal, or one at which
     something is behind its camera; ``PoseNotReached`` for a pose out of reach.
 
-    >>> hrsynth.equilibria("rrrrr_m1", at="x=0,y=0.25").attracting[0].kind
+    >>> hrsynth.equilibria("rrrrr_m1", goal="x=0,y=0.25").attracting[0].kind
     'goal'
     """
-    setup = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
+    setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed)
     if complete:
         setup.by_segments("subdivision")
-    asked = [] if at is None else [asked_pose(at)]
+    asked = [] if goal is None else [asked_pose(goal)]
     setup = setup.telling(asked)
     require_seen(setup)
-    goal = next(iter(configurations_at(setup, asked)), setup.all_samples.start)
-    require_regular(ConfigurationAnalysis.of(setup), "goal", goal)
-    search = EquilibriumSearch.of(setup, goal, depth)
-    require_sight(setup, search.law, "goal", goal)
+    target = next(iter(configurations_at(setup, asked)), setup.all_samples.start)
+    require_regular(ConfigurationAnalysis.of(setup), "goal", target)
+    search = EquilibriumSearch.of(setup, target, depth)
+    require_sight(setup, search.law, "goal", target)
     report("rests")
-    return search.answer(seed, complete=complete, effort=effort, jobs=jobs or os.cpu_count() or 1)
+    return search.answer(seed, complete=complete, max_boxes=max_boxes, jobs=jobs or os.cpu_count() or 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,11 +155,11 @@ class EquilibriumSearch:
         minima: bool = False,
         rounds: Iterable[Array] | None = None,
         complete: bool = False,
-        effort: int = COVER_BOXES,
+        max_boxes: int = COVER_BOXES,
         jobs: int = 1,
     ) -> Equilibria:
         """The rests that were found; ``minima`` and ``rounds`` as for :func:`.critical_points`, of minima alone neither
-        lists nor enclosures; ``complete``: whether it is to be proved that they are all, with ``effort`` boxes at
+        lists nor enclosures; ``complete``: whether it is to be proved that they are all, with ``max_boxes`` boxes at
         most in so many processes (``jobs``)."""
         setup, motion = self.setup, self.setup.motion
         further = None if minima or self.system.supposes else self._further(seed)
@@ -170,7 +170,7 @@ class EquilibriumSearch:
         isolated = self._in_mode(found.isolated)
         covers = None
         if not minima and all(each.by_segment for each in setup.observed):
-            covers = CompletenessProof.of(setup, self.goal, self.system, effort if complete else None, jobs)
+            covers = CompletenessProof.of(setup, self.goal, self.system, max_boxes if complete else None, jobs)
         for turn in range(MISSED_ROUNDS):
             if covers is None:
                 break

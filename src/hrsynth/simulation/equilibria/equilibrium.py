@@ -194,7 +194,7 @@ class CompletenessReport(Value):
         if cover.reason:
             return cover.reason
         if cover.open:
-            more = f"; {cover.boxes:,} were looked at, more with --effort" if cover.spent else ""
+            more = f"; {cover.boxes:,} were looked at, more with --max-boxes" if cover.spent else ""
             return f"{len(cover.open):,} boxes, {cover.share:.2g} of all, are left open{self._where()}{more}"
         if self.only_found:
             return f"{self.only_found} of the list are not among those that boxes prove"
