@@ -1227,7 +1227,7 @@ def test_no_loop(run, robot):
     lines = FOUR_BAR.split("\n")
     file = robot("\n".join(lines[:24] + lines[33:]))
     assert run("derive", file).refused() == [
-        f"hrsynth: {file}:1: no loop: not a parallel robot, allowed: a <loop>; for a serial arm or a free body "
+        f"hrsynth: {file}:1: no loop: not a parallel robot: expected a <loop>; for a serial arm or a free body "
         '<hrsynth serial="true">'
     ]
 
@@ -1272,7 +1272,7 @@ def test_files_that_are_none(run, robot, tmp_path: Path):
     with open(sparse, "wb") as stream:
         stream.truncate(200_000_000)
     assert "no such file" in run("derive", tmp_path / "none.urdf").refused()[0]
-    assert "a robot's file, found ''" in run("derive", "").refused()[0]
+    assert "a robot's file: got ''" in run("derive", "").refused()[0]
     assert "no such joint" in run("derive", robot(FOUR_BAR), "--motors", "").refused()[0]
     assert "too large" in run("derive", sparse).refused()[0]
     assert "empty file" in run("derive", robot("", "empty.urdf")).refused()[0]

@@ -147,27 +147,27 @@ def test_a_flag_can_be_denied_and_words_that_repeat_are_all_taken():
         ("derive", "derive needs ROBOT"),
         ("accuracy delta", "as --cone 0.1deg, or"),
         ("catalog site", "catalog site needs -o, --output DIR"),
-        ("derive quattro --observ 1", "no such option, found '--observ', allowed: --observe"),
-        ("derive quattro -x", "derive: no such option, found '-x'"),
-        ("derive quattro --nope", "no such option, found '--nope', allowed: --as-written, --at"),
-        ("-x", "no such option, found '-x', allowed: -h, --help"),
-        ("derive quattro --seed x", "--seed, found 'x', allowed: an integer, at least 0"),
-        ("derive quattro --seed 1.5", "--seed, found '1.5'"),
-        ("derive quattro --seed=-1", "--seed, found '-1'"),
-        ("servo delta --gain 1e9", "--gain, found '1e9', allowed: a number, at most 1e+06"),
-        ("modes delta --time-limit nan", "--time-limit, found 'nan'"),
-        ("derive quattro a b", "derive takes no more arguments, found 'a b'"),
-        ("derive quattro --at", "--at: expected one argument, allowed: POSE"),
-        ("derive quattro -o --observe 1,4", "-o needs a value, found '--observe', allowed: FILE, or -o=--observe"),
-        ("legs delta --observe --at 1", "--observe needs a value, found '--at'"),
-        ("derive quattro --observe 1 --observe 4", "--observe is given 2 times, found '1 4', allowed: 1,4"),
+        ("derive quattro --observ 1", "no such option: got '--observ', expected --observe"),
+        ("derive quattro -x", "derive: no such option: got '-x'"),
+        ("derive quattro --nope", "no such option: got '--nope', expected --as-written, --at"),
+        ("-x", "no such option: got '-x', expected -h, --help"),
+        ("derive quattro --seed x", "--seed: got 'x', expected an integer, at least 0"),
+        ("derive quattro --seed 1.5", "--seed: got '1.5'"),
+        ("derive quattro --seed=-1", "--seed: got '-1'"),
+        ("servo delta --gain 1e9", "--gain: got '1e9', expected a number, at most 1e+06"),
+        ("modes delta --time-limit nan", "--time-limit: got 'nan'"),
+        ("derive quattro a b", "derive takes no more arguments: got 'a b'"),
+        ("derive quattro --at", "--at: expected one argument: expected POSE"),
+        ("derive quattro -o --observe 1,4", "-o needs a value: got '--observe', expected FILE, or -o=--observe"),
+        ("legs delta --observe --at 1", "--observe needs a value: got '--at'"),
+        ("derive quattro --observe 1 --observe 4", "--observe is given 2 times: got '1 4', expected 1,4"),
         ("derive quattro --json=3", "--json: ignored explicit argument '3'"),
         *[
-            (f"derive quattro --seed{between}--", "--seed, found '--', allowed: an integer, at least 0")
+            (f"derive quattro --seed{between}--", "--seed: got '--', expected an integer, at least 0")
             for between in " ="
         ],
-        ("nope", "no such command, found 'nope', allowed: derive"),
-        ("catalog nope", "no such command, found 'nope'"),
+        ("nope", "no such command: got 'nope', expected derive"),
+        ("catalog nope", "no such command: got 'nope'"),
     ],
 )
 def test_what_cannot_be_read_is_refused_in_one_line(capsys, words: str, told: str):
@@ -211,7 +211,7 @@ def test_python_m_hrsynth_is_the_command_line():
 def test_the_old_names_of_start_and_goal_are_no_options(capsys):
     for old in ("--from", "--to"):
         assert execute(["path", "rrrrr_m1", "--start", "x=0.05", old, "x=0.01"]) == 2
-        assert f"path: no such option, found '{old}'" in capsys.readouterr().err
+        assert f"path: no such option: got '{old}'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -326,6 +326,6 @@ def test_groups_of_commands_have_examples_too(capsys):
 
 def test_a_command_without_a_record_is_told_from_no_command(capsys):
     assert execute(["schema", "studio"]) == 2
-    assert "this command prints no JSON, found 'studio'" in capsys.readouterr().err
+    assert "this command prints no JSON: got 'studio'" in capsys.readouterr().err
     assert execute(["schema", "stodio"]) == 2
-    assert "no record of the command, found 'stodio'" in capsys.readouterr().err
+    assert "no record of the command: got 'stodio'" in capsys.readouterr().err

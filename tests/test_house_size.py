@@ -69,7 +69,7 @@ def allowed() -> dict[str, dict[str, int]]:
 def test_no_folder_has_more_lines_than_allowed():
     limits = allowed()
     over = [
-        f"{kind} of {folder}: {lines}, allowed {limits[kind].get(folder, 0)}"
+        f"{kind} of {folder}: {lines}: expected {limits[kind].get(folder, 0)}"
         for kind, folders in counted().items()
         for folder, lines in folders.items()
         if lines > limits[kind].get(folder, 0)

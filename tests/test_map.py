@@ -101,7 +101,7 @@ def test_any_function_is_asked_and_any_question():
         ("check", [None], {}, "the path of a robot file"),
     ],
 )
-def test_what_cannot_be_asked_is_refused_before_the_work(question, robots, options, allowed):
+def test_what_cannot_be_asked_is_refused_before_the_work(question, robots, options, expected):
     with pytest.raises(BadRequest, match=allowed):
         hrsynth.map_robots(question, robots, **options)
 

@@ -68,50 +68,50 @@ def test_a_wrong_keyword_is_told_with_the_nearest_and_all(ask: Any, near: str):
         (lambda: hrsynth.lint(hrsynth.load("3rrr_m1")), "a path, the name of a shipped robot"),
         (lambda: hrsynth.save("3rrr_m1", "x.xml", meshes="move"), "keep, copy"),
         (lambda: hrsynth.branch("rrrrr_m1", [1, 2]), "hip=-1:1"),
-        (lambda: hrsynth.branch("rrrrr_m1", "shoulder_1"), "^a box of motors, found 'shoulder_1', allowed: low:high"),
+        (lambda: hrsynth.branch("rrrrr_m1", "shoulder_1"), "^a box of motors: got 'shoulder_1', expected low:high"),
         (lambda: hrsynth.draw(5), "what a function of hrsynth answers"),
-        (lambda: hrsynth.check("rrrrr_m1", seed="a"), "seed, found 'a', allowed: an integer"),
+        (lambda: hrsynth.check("rrrrr_m1", seed="a"), "seed: got 'a', expected an integer"),
         (lambda: hrsynth.check("rrrrr_m1", seed=-1), "at least 0"),
         (lambda: hrsynth.observe("rrrrr_m1", seed=-1), "at least 0"),
-        (lambda: hrsynth.branch("rrrrr_m1", max_cells=1.5), "max_cells, found 1.5, allowed: an integer"),
+        (lambda: hrsynth.branch("rrrrr_m1", max_cells=1.5), "max_cells: got 1.5, expected an integer"),
         (lambda: hrsynth.modes("rrrrr_m1", real="maybe"), "True or False"),
-        (lambda: hrsynth.modes("rrrrr_m1", time_limit=True), "time_limit, found True, allowed: a number"),
+        (lambda: hrsynth.modes("rrrrr_m1", time_limit=True), "time_limit: got True, expected a number"),
         (lambda: hrsynth.advise("rrrrr_m1", cost={"encoder": 1}), "a text"),
         (lambda: hrsynth.accuracy("rrrrr_m1", cone=[1]), "more than 0 and less than 90deg"),
         (lambda: hrsynth.accuracy("rrrrr_m1", cone=0.01, noise=3), "a text such as 0.1deg"),
         (lambda: hrsynth.servo("rrrrr_m1", start="x=0", goal="x=0", gain="x"), "a number"),
         (lambda: hrsynth.servo("rrrrr_m1", start="x=0", goal="x=0", noise=3), "a text such as 0.1deg"),
-        (lambda: hrsynth.singularities("rrrrr_m1", points=0), "points, found 0, allowed: an integer, at least 1"),
-        (lambda: hrsynth.modes("rrrrr_m1", time_limit=-1), "time_limit, found -1, allowed: a number, at least 0"),
+        (lambda: hrsynth.singularities("rrrrr_m1", points=0), "points: got 0, expected an integer, at least 1"),
+        (lambda: hrsynth.modes("rrrrr_m1", time_limit=-1), "time_limit: got -1, expected a number, at least 0"),
         (
             lambda: hrsynth.modes("rrrrr_m1", time_limit=math.nan),
-            "time_limit, found nan, allowed: a number, at least 0",
+            "time_limit: got nan, expected a number, at least 0",
         ),
         (lambda: hrsynth.singularities("rrrrr_m1", points=10**8), "an integer, at least 1, at most 1e"),
         (
             lambda: hrsynth.accuracy("rrrrr_m1", cone=0.01, plane="", steps=1),
-            "^steps, found 1, .* at least 5, at most 300",
+            "^steps: got 1, .* at least 5, at most 300",
         ),
-        (lambda: hrsynth.basins("rrrrr_m1", goal="x=0", steps=301), "^steps, found 301, .* at least 2, at most 300"),
-        (lambda: hrsynth.basins("rrrrr_m1", goal="x=0", jobs=0), "^jobs, found 0, .* at least 1$"),
-        (lambda: hrsynth.equilibria("rrrrr_m1", goal="x=0", max_boxes=0), "^max_boxes, found 0, .* at least 1$"),
+        (lambda: hrsynth.basins("rrrrr_m1", goal="x=0", steps=301), "^steps: got 301, .* at least 2, at most 300"),
+        (lambda: hrsynth.basins("rrrrr_m1", goal="x=0", jobs=0), "^jobs: got 0, .* at least 1$"),
+        (lambda: hrsynth.equilibria("rrrrr_m1", goal="x=0", max_boxes=0), "^max_boxes: got 0, .* at least 1$"),
         (lambda: hrsynth.servo("rrrrr_m1", start="x=0", goal="x=0", gain=1e7), "^gain, .* at most 1e"),
-        (lambda: hrsynth.select("rrrrr_m1", start="x=0", goal="x=0", examine=0), "^examine, found 0, .* at least 1$"),
-        (lambda: hrsynth.draw(hrsynth.singularities("rrrrr_m1", points=5), steps=1), "^steps, found 1, .* at least 5"),
-        (lambda: hrsynth.verify(None), "a file, allowed: its path"),
-        (lambda: hrsynth.save("rrrrr_m1", None), "a file, allowed: its path"),
-        (lambda: hrsynth.draw(hrsynth.derive("rrrrr_m1"), 3), "a file, found 3, allowed: its path"),
-        (lambda: hrsynth.accuracy("rrrrr_m1", cone=0.01, grid="x=0:0.1:2,y=0", into=3), "a file, found 3"),
+        (lambda: hrsynth.select("rrrrr_m1", start="x=0", goal="x=0", examine=0), "^examine: got 0, .* at least 1$"),
+        (lambda: hrsynth.draw(hrsynth.singularities("rrrrr_m1", points=5), steps=1), "^steps: got 1, .* at least 5"),
+        (lambda: hrsynth.verify(None), "a file: expected its path"),
+        (lambda: hrsynth.save("rrrrr_m1", None), "a file: expected its path"),
+        (lambda: hrsynth.draw(hrsynth.derive("rrrrr_m1"), 3), "a file: got 3, expected its path"),
+        (lambda: hrsynth.accuracy("rrrrr_m1", cone=0.01, grid="x=0:0.1:2,y=0", into=3), "a file: got 3"),
         (
             lambda: hrsynth.check("rrrrr_m1", grid={"x": (0, 0.1, 2)}),
-            "^a grid, found .*, allowed: a text such as x=-0.3",
+            "^a grid: got .*, expected a text such as x=-0.3",
         ),
-        (lambda: hrsynth.accuracy("rrrrr_m1", cone=0.01, grid=["x=0:0.1:2"]), "^a grid, found .*, allowed: a text"),
-        (lambda: hrsynth.load("rrrrr_m1", motors=[1]), "^names, found .*, allowed: texts in"),  # type: ignore[list-item]
-        (lambda: hrsynth.load("rrrrr_m1", motors=1), "^names, found 1, allowed: texts in a list"),
+        (lambda: hrsynth.accuracy("rrrrr_m1", cone=0.01, grid=["x=0:0.1:2"]), "^a grid: got .*, expected a text"),
+        (lambda: hrsynth.load("rrrrr_m1", motors=[1]), "^names: got .*, expected texts in"),  # type: ignore[list-item]
+        (lambda: hrsynth.load("rrrrr_m1", motors=1), "^names: got 1, expected texts in a list"),
         (lambda: hrsynth.load("rrrrr_m1", close=[("a", "b")]), "^names, found"),  # type: ignore[list-item]
-        (lambda: hrsynth.load("rrrrr_m1", tolerance="x"), "^tolerance, found 'x', allowed: 1e-11"),
-        (lambda: hrsynth.studio(3, open_=False), "a robot's file, found 3"),
+        (lambda: hrsynth.load("rrrrr_m1", tolerance="x"), "^tolerance: got 'x', expected 1e-11"),
+        (lambda: hrsynth.studio(3, open_=False), "a robot's file: got 3"),
     ],
 )
 def test_a_value_of_another_kind_is_told_with_what_is_allowed(ask: Any, allowed: str):
@@ -122,7 +122,7 @@ def test_a_value_of_another_kind_is_told_with_what_is_allowed(ask: Any, allowed:
 def test_what_is_left_out_is_told_with_the_function():
     with pytest.raises(TypeError, match=r"^path: .*'goal'; it takes robot, .*goal"):
         hrsynth.path("3rrr_m1", start="x=0")  # type: ignore[call-arg]
-    with pytest.raises(BadRequest, match="how wrong the observations may be is not given, allowed: a cone about"):
+    with pytest.raises(BadRequest, match="how wrong the observations may be is not given: expected a cone about"):
         hrsynth.accuracy("3rrr_m1")
 
 

@@ -139,7 +139,7 @@ def test_what_is_no_pose_is_refused_in_one_line(given):
         hrsynth.check("3rrr_m1", at=given)
     (line,) = caught.value.lines()
     assert "\n" not in str(caught.value)
-    assert caught.value.allowed, line
+    assert caught.value.expected, line
     assert len(line) < 600
 
 

@@ -48,15 +48,23 @@ class AssumedPlatform(UserWarning):
     """Warning that a file names no platform, and which link is taken for it."""
 
 
+def compose_message(problem: str, got: str | None, expected: str | None, remedy: str = "") -> str:
+    """Return one line: ``problem: got X, expected Y. Remedy.``; parts that are empty are left out."""
+    facts = ", ".join([f"got {got}"] * (got is not None) + [f"expected {expected}"] * bool(expected))
+    text = f"{problem}: {facts}" if facts else problem
+    return " ".join(f"{text}. {remedy}".split()) if remedy else " ".join(text.split())
+
+
 @dataclass(frozen=True)
 class Defect:
-    """One thing wrong in a file: where, what, the value found, what is allowed."""
+    """Defect of a file: line, problem, the value found there, what is expected, what to do."""
 
     file: str
     line: int | None
-    what: str
-    value: str | None = None
-    allowed: str | None = None
+    problem: str
+    got: str | None = None
+    expected: str | None = None
+    remedy: str = ""
 
     def __str__(self) -> str:
         where = self.file if self.line is None else f"{self.file}:{self.line}"
@@ -64,13 +72,8 @@ class Defect:
 
     @property
     def text(self) -> str:
-        """What is wrong, without where."""
-        text = self.what
-        if self.value is not None:
-            text += f", found {self.value}"
-        if self.allowed is not None:
-            text += f", allowed: {self.allowed}"
-        return " ".join(text.split())
+        """Message without file and line."""
+        return compose_message(self.problem, self.got, self.expected, self.remedy)
 
 
 class BadRobotFile(HrsynthError):
@@ -91,17 +94,27 @@ def shorten_text(text: str, length: int = 200) -> str:
 
 
 class BadRequest(HrsynthError):
-    """An argument that does not fit the robot: what, the value found, what is allowed."""
+    """Request that cannot be served as it is given.
 
-    def __init__(self, what: str, value: object = None, allowed: str | Sequence[str] | None = None) -> None:
-        self.what, self.value = what, value
-        self.allowed = allowed if allowed is None or isinstance(allowed, str) else ", ".join(allowed)
-        text = what
-        if value is not None:
-            text += f", found {shorten_text(repr(value))}"
-        if self.allowed:
-            text += f", allowed: {self.allowed}"
-        super().__init__(text)
+    Parameters
+    ----------
+    problem
+        Option or argument, and what is wrong with it: ``--plane z=3: the platform cannot move along z``.
+    got
+        Value that was given.
+    expected
+        Values that are possible.
+    remedy
+        Sentence that says what to do: ``Use x, y or phi.``
+    """
+
+    def __init__(
+        self, problem: str, got: object = None, expected: str | Sequence[str] | None = None, *, remedy: str = ""
+    ) -> None:
+        self.problem, self.got, self.remedy = problem, got, remedy
+        self.expected = expected if expected is None or isinstance(expected, str) else ", ".join(expected)
+        shown = None if got is None else shorten_text(repr(got))
+        super().__init__(compose_message(problem, shown, self.expected, remedy))
 
 
 class NoPlatform(BadRequest):
@@ -130,9 +143,20 @@ class UndefinedValue(BadRequest):
 
 
 class NoResult(HrsynthError):
-    """Base of the errors for sound requests that have no answer."""
+    """Sound request without a result: what was not reached, with its numbers, and the next step.
+
+    Parameters
+    ----------
+    problem
+        ``ROBOT: goal not met: number with unit``.
+    remedy
+        Sentence that says what to do next.
+    """
 
     exit_status = 3
+
+    def __init__(self, problem: str, remedy: str = "") -> None:
+        super().__init__(compose_message(problem, None, None, remedy))
 
 
 class LoopsNotClosed(NoResult):

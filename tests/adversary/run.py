@@ -150,7 +150,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     chosen = given.kinds.split(",")
     if unknown := set(chosen) - set(ALL):
-        parser.error(f"unknown kinds {', '.join(sorted(unknown))}, allowed: {', '.join(ALL)}")
+        parser.error(f"unknown kinds {', '.join(sorted(unknown))}: expected {', '.join(ALL)}")
     wanted = tasks(given.count, given.seed, chosen)
     done, now = {}, code()
     if given.log is not None and given.log.exists():

@@ -378,7 +378,7 @@ def test_progress_and_the_public_name() -> None:
 def test_unknown_names(observe: str, camera: str | None, value: str) -> None:
     with pytest.raises(BadRequest) as caught:
         advise(load("delta"), observe, camera)
-    assert caught.value.value == value
+    assert caught.value.got == value
 
 
 @pytest.mark.some(0, 16)

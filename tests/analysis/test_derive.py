@@ -492,7 +492,7 @@ def test_bad_requests(observe: list[str] | None, camera: str | None, form: str, 
     with pytest.raises(BadRequest) as caught:
         derive(load("delta"), observe, camera, form=form)
     assert caught.value.exit_status == 2
-    assert caught.value.value == value
+    assert caught.value.got == value
     assert allowed in str(caught.value)
     assert len(caught.value.lines()) == 1
 

@@ -273,7 +273,7 @@ def test_a_carried_camera_sees_no_less_of_a_rigid_platform(robot: str) -> None:
 def test_an_unknown_camera() -> None:
     with pytest.raises(BadRequest) as caught:
         legs(load("delta"), camera="moon")
-    assert caught.value.value == "moon"
+    assert caught.value.got == "moon"
     assert "platform" in str(caught.value)
 
 

@@ -23,7 +23,7 @@ from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.model import PlatformChoice
 from oracle import Oracle
 
-OPEN = PlatformChoice("open", "several could be, allowed: --platform LINK")
+OPEN = PlatformChoice("open", "several could be: expected --platform LINK")
 TREE = ["1 0 0", "0 1 0", "0.6 0 0.8"]
 
 

@@ -313,9 +313,9 @@ def test_motors_that_do_not_make_a_function_are_refused():
         branch(idle)
     with pytest.raises(BadRequest, match="shoulder_9"):
         branch(robot, {"shoulder_9": (-1, 1)})
-    with pytest.raises(BadRequest, match="found 'nowhere', allowed"):
+    with pytest.raises(BadRequest, match="got 'nowhere', expected"):
         branch("rrrrr_m1", box="nowhere=-1:1")
-    with pytest.raises(BadRequest, match="found '1:2', allowed: low < high"):
+    with pytest.raises(BadRequest, match="got '1:2', expected low < high"):
         branch("rrrrr_m1", box="shoulder_1=1:2")
     with pytest.raises(BadRequest, match="low < high"):
         branch(robot, "shoulder_1=1:2")
@@ -422,7 +422,7 @@ def test_a_robot_without_motors_is_refused_as_everywhere() -> None:
     still = replace(robot, joints={name: replace(joint, motor=None) for name, joint in robot.joints.items()})
     said = []
     for ask in (lambda: branch(still), lambda: modes(still, real=True)):
-        with pytest.raises(BadRequest, match="has no motor, allowed: one or more: --motors names them") as refused:
+        with pytest.raises(BadRequest, match="has no motor: expected one or more: --motors names them") as refused:
             ask()
         said.append(str(refused.value))
     assert said[0] == said[1]

@@ -362,7 +362,7 @@ def test_files_round_trip_and_cut_off_ones_are_refused(whole: dict[str, bytes]):
     for cut in range(0, len(data), 37):
         with pytest.raises(BadRequest):
             decode_lines(data[:cut], "c")
-    with pytest.raises(BadRequest, match=r"another version, found 'format 1, words 9', allowed: .*build it again"):
+    with pytest.raises(BadRequest, match=r"another version: got 'format 1, words 9', expected .*build it again"):
         decode_lines(data.replace(b'"catalog":1', b'"catalog":9', 1), "c")
 
 

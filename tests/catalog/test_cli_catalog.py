@@ -243,7 +243,7 @@ def test_bad_input_is_one_line(run, folder: Path, tmp_path: Path, monkeypatch: p
     check_refused(run("build"), "nowhere to build")
     package = Path(hrsynth.__file__).parent
     check_refused(run("build", "-o", package / "catalog" / "new"), "cannot build into the package")
-    check_refused(run("build", "nothing", "-o", tmp_path / "new"), "unknown group, found 'nothing', allowed: c, d")
+    check_refused(run("build", "nothing", "-o", tmp_path / "new"), "unknown group: got 'nothing', expected c, d")
     check_refused(run("build", "-o", tmp_path / "new", "--sample", 3), "--sample without --check")
     check_refused(run("build", "-o", folder, "--check", "--anew"), "--anew with --check")
     check_refused(run("build", "-o", tmp_path / "new", "--workers", 0), "--workers")

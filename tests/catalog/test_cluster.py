@@ -104,7 +104,7 @@ def test_a_cluster_that_dies_stops_the_build_and_keeps_the_journal(two_workers, 
     ("address", "said", "status"),
     [
         ("tcp://127.0.0.1:1", "no cluster answers at tcp://127.0.0.1:1 within", 3),
-        ("smoke://hill", "address of a cluster, found 'smoke://hill'", 2),
+        ("smoke://hill", "address of a cluster: got 'smoke://hill'", 2),
         ("tcp://127.0.0.1:none", "address of a cluster, found", 2),
     ],
 )

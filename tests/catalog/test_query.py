@@ -180,7 +180,7 @@ def test_sqlite_files_of_older_versions_are_refused(has: str, tmp_path: Path, ca
         where = "-o" if "build" in arguments else "--catalog"
         assert execute(["catalog", *arguments, where, str(file)]) == (3 if "build" in arguments else 2)
         (said,) = capsys.readouterr().err.splitlines()
-        assert "another version, found 'format 1, words 1', allowed: format 2, words 1; build it again" in said
+        assert "another version: got 'format 1, words 1', expected format 2, words 1; build it again" in said
 
 
 @pytest.mark.parametrize("name", FIELDS)
@@ -417,7 +417,7 @@ def test_a_catalog_is_a_collection(stores: tuple[Path, Path]):
 def test_words_are_found_however_they_are_spelt():
     catalog = Catalog(({"word": "2(Rz*-Rz-Rz)", "group": "planar"},))
     assert catalog["(Rz*-Rz-Rz)+(Rz*-Rz-Rz)"] is catalog.records[0]
-    with pytest.raises(BadRequest, match=r"not in the catalog, found '3\(Rz\*-Rz-Rz\)', allowed: 2\(Rz\*-Rz-Rz\)"):
+    with pytest.raises(BadRequest, match=r"not in the catalog: got '3\(Rz\*-Rz-Rz\)', expected 2\(Rz\*-Rz-Rz\)"):
         _ = catalog["3(Rz*-Rz-Rz)"]
     with pytest.raises(BadRequest, match="unknown joint"):
         _ = catalog["3(Qz*-Rz-Rz)"]
@@ -429,7 +429,7 @@ def test_the_package_has_its_catalog():
 
 def test_what_cannot_be_asked_or_read_is_refused(stores: tuple[Path, Path], tmp_path: Path):
     lines, big = stores
-    with pytest.raises(BadRequest, match="cannot be asked for, found 'colour'"):
+    with pytest.raises(BadRequest, match="cannot be asked for: got 'colour'"):
         load(lines, colour="red")
     with pytest.raises(BadRequest, match="no such catalog"):
         load(tmp_path / "nowhere")
@@ -446,7 +446,7 @@ def test_what_cannot_be_asked_or_read_is_refused(stores: tuple[Path, Path], tmp_
     with sqlite3.connect(newer) as file:
         file.execute("UPDATE versions SET format = 7")
     for refuse in (load, lambda path: build(path, source=source())):
-        with pytest.raises(BadRequest, match="another version, found 'format 7, words 1', allowed: format 2, words 1"):
+        with pytest.raises(BadRequest, match="another version: got 'format 7, words 1', expected format 2, words 1"):
             refuse(newer)
 
 
@@ -461,7 +461,7 @@ def test_a_fresh_catalog_is_not_stale(stores: tuple[Path, Path]):
     [
         ('"idle":0', '"idle":1', "c: 59 of 60 compared with other records today, the first (c00)"),
         ('"catalog":1', '"catalog":8', "another version"),
-        ('"count":60', '"count":61', "truncated, records, found 60, allowed: 61"),
+        ('"count":60', '"count":61', "truncated, records: got 60, expected 61"),
         ('{"word":"(c01)"', '{"word":"(b01)"', "c: 1 missing, the first (c01)"),
         ('{"word":"(c01)"', '{"word":"(b01)"', "c: 1 no longer of the group, the first (b01)"),
         ('{"word":"(c01)"', '{"word":"(c90)"', "is not sorted"),

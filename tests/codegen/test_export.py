@@ -392,7 +392,7 @@ def test_what_is_watched_is_refused_before_the_proof(monkeypatch: pytest.MonkeyP
     ):
         with pytest.raises(BadRequest, match=match):
             export(robot, **wrong)
-    with pytest.raises(BadRequest, match="directions of segments only, found 'point point_1'"):
+    with pytest.raises(BadRequest, match="directions of segments only: got 'point point_1'"):
         export(with_sights(robot, [parse_see(f"point:{robot.platform}@0,0,0.1", [])]))
 
 

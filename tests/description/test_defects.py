@@ -24,7 +24,7 @@ def defects(text: str | bytes) -> list[tuple[int | None, str]]:
     error = caught.value
     assert error.exit_status == 2
     assert all(line.startswith("robot.urdf") and "\n" not in line for line in error.lines())
-    return [(defect.line, f"{defect.what}, {defect.value}, {defect.allowed}") for defect in error.defects]
+    return [(defect.line, f"{defect.problem}, {defect.got}, {defect.expected}") for defect in error.defects]
 
 
 def edited(*changes: tuple[str, str] | tuple[int, str]) -> str:
@@ -250,7 +250,7 @@ def test_all_defects_are_reported_at_once_in_the_order_of_their_lines():
 def test_a_message_is_one_line_with_file_line_value_and_what_is_allowed():
     with pytest.raises(BadRobotFile) as caught:
         native.parse(edited((10, '<axis xyz="0&#10;0 0"/>')), "robots/x.urdf")
-    assert caught.value.lines() == ["robots/x.urdf:10: xyz of <axis>, found 0 0 0, allowed: a non-zero vector"]
+    assert caught.value.lines() == ["robots/x.urdf:10: xyz of <axis>: got 0 0 0, expected a non-zero vector"]
 
 
 @pytest.mark.parametrize(

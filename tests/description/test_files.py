@@ -46,7 +46,7 @@ def test_junk_of_200_megabytes_is_refused_without_reading(tmp_path: Path):
     with open(path, "wb") as stream:
         stream.truncate(200_000_000)
     start = time.perf_counter()
-    assert "file too large, found 200000000 bytes" in refused(path)
+    assert "file too large: got 200000000 bytes" in refused(path)
     assert time.perf_counter() - start < 0.2
 
 
@@ -67,7 +67,7 @@ def test_an_unknown_name_gets_close_matches(tmp_path: Path, monkeypatch: pytest.
     with pytest.raises(BadRequest) as caught:
         description.load("linkge")
     assert caught.value.lines() == [
-        "neither a file nor a shipped robot, found 'linkge', allowed: a file, or a name that `hrsynth robots` lists, "
+        "neither a file nor a shipped robot: got 'linkge', expected a file, or a name that `hrsynth robots` lists, "
         "such as linkage"
     ]
     with pytest.raises(BadRequest, match="such as scissors, linkage, pendulum"):

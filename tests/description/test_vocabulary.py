@@ -165,7 +165,7 @@ def test_a_mistyped_axis_is_refused_with_its_line(tmp_path: Path, capsys: pytest
     path.write_text(text.replace('<axis xyz="0 0 1"', '<axis xyx="0 0 1"', 1))
     assert execute(["check", str(path)]) == 2
     line = text.split("<axis")[0].count("\n") + 1
-    assert capsys.readouterr().err == f"hrsynth: {path}:{line}: unknown attribute of <axis>, found xyx, allowed: xyz\n"
+    assert capsys.readouterr().err == f"hrsynth: {path}:{line}: unknown attribute of <axis>: got xyx, expected xyz\n"
 
 
 @pytest.mark.parametrize("wrong", ["closed_lop", "closedLoop", "closed-loop", "name_mto", "joint_names"])
@@ -179,7 +179,7 @@ def test_a_mistyped_key_beside_a_urdf_is_refused_with_its_line(wrong: str, tmp_p
     line = path.read_text().split(f"{wrong}:")[0].count("\n") + 1
     with pytest.raises(BadRobotFile) as caught:
         load(path)
-    assert str(caught.value.defects[0]) == f"{path}:{line}: unknown key, found {wrong}, allowed: {key}"
+    assert str(caught.value.defects[0]) == f"{path}:{line}: unknown key: got {wrong}, expected {key}"
 
 
 def test_another_unknown_name_is_said_once_and_names_of_other_programs_are_not(tmp_path: Path, capsys):

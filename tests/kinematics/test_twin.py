@@ -244,7 +244,7 @@ def test_a_motor_on_a_floating_joint_that_others_hold_is_refused() -> None:
     robot = cycle("RRRR", np.random.default_rng(0))
     free = robot.changed(joints=[Joint("free", JointType.FREE, "base", "link_2", np.zeros(3))])
     assert PinocchioModel(free).model.nv == PinocchioModel(robot).model.nv
-    with pytest.raises(BadMechanism, match="a motor on a floating joint whose link other joints hold, found 'free'"):
+    with pytest.raises(BadMechanism, match="a motor on a floating joint whose link other joints hold: got 'free'"):
         PinocchioModel(free.changed(joints=[replace(free.joints["free"], motor=Motor("m"))]))
 
 
@@ -271,7 +271,7 @@ def test_of_two_floating_joints_the_same_is_idle_with_gears() -> None:
     for name in ("first", "second"):
         driven = robot.changed(joints=[replace(robot.joints[name], motor=Motor("m"))])
         if name == idle:
-            with pytest.raises(BadMechanism, match=f"found '{name}'"):
+            with pytest.raises(BadMechanism, match=f"got '{name}'"):
                 PinocchioModel(driven)
         else:
             assert PinocchioModel(driven).mechanism.joints[name].actuated

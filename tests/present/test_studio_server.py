@@ -353,7 +353,7 @@ def test_a_question_that_takes_too_long_is_given_up(server: StudioServer, monkey
 def test_what_fails_is_one_line_and_the_next_is_answered(page: Page):
     process = page.ask("open")["answer"]["process"]
     for kind, fields, told, name in (
-        ("refuse", {}, "nothing fits, found 7, allowed: less", "BadRequest"),
+        ("refuse", {}, "nothing fits: got 7, expected less", "BadRequest"),
         ("defect", {}, "a defect of hrsynth itself, please report it: ZeroDivisionError: by zero", "Defect"),
         ("nan", {}, "a defect of hrsynth itself", "Defect"),
         ("eat", {"bytes": 10**11}, "more memory than is allowed (4 GB)", "MemoryError"),

@@ -117,7 +117,7 @@ def test_a_depth_that_is_only_supposed_bends_the_way_and_may_make_the_goal_repel
 
 
 def test_a_depth_that_nothing_needs_is_refused() -> None:
-    with pytest.raises(BadRequest, match=r"--depth: .* found 'desired', allowed: none, or --sensor"):
+    with pytest.raises(BadRequest, match=r"--depth: .* got 'desired', expected none, or --sensor"):
         hrsynth.servo("delta", start="x=0", goal="x=0.05", depth="desired")
 
 
@@ -152,7 +152,7 @@ def test_a_led_loop_of_points_follows_more_closely() -> None:
 def test_noise_in_pixels_needs_a_focal_length_and_keeps_the_platform_near_its_goal() -> None:
     with pytest.raises(BadRequest, match="focal"):
         platform(noise="0.3px")
-    with pytest.raises(BadRequest, match="errors in lengths, found '1mm', allowed: 0"):
+    with pytest.raises(BadRequest, match="errors in lengths: got '1mm', expected 0"):
         platform(noise="1mm")
     found = hrsynth.servo("gough_stewart", camera=SIZED, sensor=POINTS, start=START, goal=GOAL, noise="0.3px", time=4.0)
     assert found.spread is not None

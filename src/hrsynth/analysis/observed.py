@@ -554,7 +554,7 @@ def _seeing(
         try:
             robot = with_sights(robot, [spec])
         except BadRequest as error:
-            raise BadRequest(f"{flag} {text}: {error.what}", error.value, error.allowed) from None
+            raise BadRequest(f"{flag} {text}: {error.problem}", error.got, error.expected) from None
         labels.append({o.leg for o in robot.observations}.difference(*labels))
     return robot, set().union(*labels[1 : len(sensor) + 1]), set().union(*labels[len(sensor) + 1 :])
 
@@ -563,7 +563,7 @@ def _spec(option: str, text: str, eyes: Sequence[str]) -> ObservationSpec:
     try:
         return parse_see(text, eyes)
     except BadRequest as error:
-        raise BadRequest(error.what.replace("--sensor", option, 1), error.value, error.allowed) from None
+        raise BadRequest(error.problem.replace("--sensor", option, 1), error.got, error.expected) from None
 
 
 def _observations(

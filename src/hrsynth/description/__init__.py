@@ -185,7 +185,7 @@ def _read_content(robot: Any, overrides: Overrides) -> Mechanism:
             found = read(file, overrides)
         except BadRobotFile as error:
             raise BadRobotFile(
-                replace(each, file=said(each.file), what=said(each.what), value=each.value and said(each.value))
+                replace(each, file=said(each.file), problem=said(each.problem), got=each.got and said(each.got))
                 for each in error.defects
             ) from None
         except HrsynthError as error:

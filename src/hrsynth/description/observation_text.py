@@ -161,7 +161,7 @@ def parse_see(text: str, cameras: Sequence[str]) -> ObservationSpec:
     try:
         found = spec_of(attributes | ({"camera": camera} if camera else {}))
     except BadRequest as error:
-        raise BadRequest(f"--sensor {text}: {error.what}", error.value, error.allowed or SEE) from None
+        raise BadRequest(f"--sensor {text}: {error.problem}", error.got, error.expected or SEE) from None
     return found
 
 
@@ -257,7 +257,7 @@ def as_written(
             mechanism = _with_camera(mechanism, each) if isinstance(each, NamedCamera) else _with_sight(mechanism, each)
         except BadRequest as error:
             defects.append(
-                Defect(file, each.line, error.what, None if error.value is None else str(error.value), error.allowed)
+                Defect(file, each.line, error.problem, None if error.got is None else str(error.got), error.expected)
             )
     if defects:
         raise BadRobotFile(defects)

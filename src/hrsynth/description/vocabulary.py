@@ -147,7 +147,7 @@ class Vocabulary:
             elif not file.as_spelt:
                 where = getattr(each.line, "file", str(file.path))
                 defects.append(Defect(where, each.line, f"unknown {each.place}", each.found, each.remedy))
-        if len({(each.what, each.value) for each in defects}) + len(notes) >= MOST_UNKNOWN_NAMES:
+        if len({(each.problem, each.got) for each in defects}) + len(notes) >= MOST_UNKNOWN_NAMES:
             raise xml.refusal(
                 file.path, "too many different names that the format does not have", f"fewer than {MOST_UNKNOWN_NAMES}"
             )

@@ -135,9 +135,5 @@ class LintedFile:
 def defects_of(error: HrsynthError) -> list[tuple[int | None, str]]:
     """Line and text of all that an error says."""
     if isinstance(error, BadRobotFile):
-        found = []
-        for each in error.defects:
-            text = each.what + ("" if each.value is None else f", found {each.value}")
-            found.append((each.line, text + ("" if each.allowed is None else f", allowed: {each.allowed}")))
-        return found
+        return [(each.line, each.text) for each in error.defects]
     return [(None, " ".join(str(error).split()))]

@@ -267,7 +267,7 @@ DRIVEN = "sym_2T1R;P3RRR1G1P1A2;0;1;0;0;1;0;0;1;0;"
         (LIST, None, "P\u0663RRR1G1P1", 4, "not the name of a robot"),
         (LIST, None, "P0RRR1G1P1;S3RRR1", 4, "not the name of a robot"),
         (LIST, None, f"P3RRR1G{NINES}P1", 4, "not the name of a robot"),
-        (LIST, None, "\0\0;x", 4, r"found '\x00\x00'"),
+        (LIST, None, "\0\0;x", 4, r"got '\x00\x00'"),
         (LIST, None, b"x\xe4;", 4, "not UTF-8"),
         (LIST, None, "P3RRR1G1P1;S3RRR1", 4, "told before, in sym_2T1R_list.csv:2"),
         (LIST, None, "P3RRR1G1P2;S3PRP1", 4, "the chain of P3RRR1G1P2 is not that of its name"),

@@ -69,7 +69,7 @@ def test_an_unknown_name_tells_those_that_there_are(dialect: str, old: str, new:
     text, count = re.subn(old, new, ONE[dialect], count=1)
     assert count
     line = assert_refused(made(tmp_path, text), "unknown", "found nobody")
-    assert re.search(f", allowed: {allowed}", line), line
+    assert re.search(f": expected {allowed}", line), line
 
 
 def test_a_cut_settings_file_is_refused_with_what_is_wanted(tmp_path: Path):
@@ -173,7 +173,7 @@ def test_a_long_chain_is_refused_in_time_where_its_twin_would_be_too_large(tmp_p
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert run.returncode == 2, run.stderr[-500:]
-    assert "joints with 990 coordinates, allowed: up to 256" in run.stderr.splitlines()[-1]
+    assert "joints with 990 coordinates: expected up to 256" in run.stderr.splitlines()[-1]
 
 
 def test_includes_stay_in_their_folder_and_come_once(tmp_path: Path):

@@ -200,7 +200,7 @@ MESSAGES = {
         "<robot name='r'><link name='o'/><link name='a'/><link name='b'/>\n"
         "<joint name='j1' type='continuous'><parent link='a'/><child link='b'/></joint>\n"
         "<joint name='j2' type='continuous'><parent link='b'/><child link='a'/></joint></robot>",
-        ["robot.urdf:3: joints that form a cycle, found j2, j1, allowed: a tree"],
+        ["robot.urdf:3: joints that form a cycle: got j2, j1, expected a tree"],
     ),
     "gearbox": (
         "urdf",
@@ -208,19 +208,19 @@ MESSAGES = {
             "</robot>",
             "<gazebo><joint name='g' type='gearbox'><parent>rocker</parent><child>bar</child></joint></gazebo></robot>",
         ),
-        ["gearbox 'g': one revolute joint from its reference body, found "],
+        ["gearbox 'g': one revolute joint from its reference body: got "],
     ),
     "second link": (
         "urdf",
         "<robot name='r'><link name='a'/><link name='a'/>"
         "<joint name='j' type='continuous'><parent link='a'/><child link='b'/></joint></robot>",
-        ["robot.urdf:1: second link of the same name, found a"],
+        ["robot.urdf:1: second link of the same name: got a"],
     ),
     "second body": (
         "xml",
         "<mujoco><worldbody><body name='a'><joint/><body name='a'><joint/></body></body></worldbody>"
         "<equality><connect body1='b' body2='a' anchor='0 0 0'/></equality></mujoco>",
-        ["robot.xml:1: second body of the same name, found a"],
+        ["robot.xml:1: second body of the same name: got a"],
     ),
     "ring of frames": (
         "sdf",
@@ -233,7 +233,7 @@ MESSAGES = {
         f"version {number}": (
             "sdf",
             FILES["sdf: 1.7"]["robot.sdf"].replace('"1.7"', f'"{number}"'),
-            [f"version of <sdf>, found {number}, allowed: 1.4 to 1.12"],
+            [f"version of <sdf>: got {number}, expected 1.4 to 1.12"],
         )
         for number in ("1.13", "9.9", "1.3", "abc")
     },
@@ -259,10 +259,10 @@ def test_a_defect_of_an_included_file_is_told_with_that_file(tmp_path: Path):
     )
     main = "<mujoco><worldbody><body name='a'><joint/></body></worldbody>\n<include file='{}'/></mujoco>"
     assert refused(written(tmp_path, {"robot.xml": main.format("parts.xml")})).startswith(
-        f"{tmp_path / 'parts.xml'}:3: connect of an unknown body, found nix"
+        f"{tmp_path / 'parts.xml'}:3: connect of an unknown body: got nix"
     )
     line = refused(written(tmp_path, {"robot.xml": main.format("none.xml")}))
-    assert line.startswith(f"{tmp_path / 'robot.xml'}:2: an include of what is no such file, found none.xml")
+    assert line.startswith(f"{tmp_path / 'robot.xml'}:2: an include of what is no such file: got none.xml")
     (tmp_path / "parts.xml").write_text("<mujocoinclude>\n<include file='none.xml'/></mujocoinclude>")
     assert refused(written(tmp_path, {"robot.xml": main.format("parts.xml")})).startswith(
         f"{tmp_path / 'parts.xml'}:2: an include of what is no such file"

@@ -172,7 +172,7 @@ def test_a_gear_that_would_hold_its_joint_is_refused_and_the_joint_frozen(tmp_pa
     text = bars([("p", "one", "base", origin(0)), ("q", "two", "one", origin(1))], "").replace(
         '<child link="two"/>', '<child link="two"/><mimic joint="p" multiplier="0"/>'
     )
-    told = r"urdf:\d+: coupling 'mimic_q', which would hold joint 'q', found 0.0, .*freeze q"
+    told = r"urdf:\d+: coupling 'mimic_q', which would hold joint 'q': got 0.0, .*freeze q"
     with pytest.raises(BadMechanism, match=told):
         read(tmp_path, text, platform="two")
     assert full_mobility(read(tmp_path, text, platform="two", freeze=["q"])) == 1
@@ -205,7 +205,7 @@ def test_gears_stay_with_their_joints_whatever_link_is_the_base(tmp_path: Path):
     assert base / (one - base) == pytest.approx(-(1 + 0.5 - 0.7))
     part = read(tmp_path, text, base="base", platform="two")
     assert [each.name for each in part.couplings] == ["mimic_q"]
-    with pytest.raises(BadRequest, match="gears join joints between 'one' and 'tip' through others, found 'p'"):
+    with pytest.raises(BadRequest, match="gears join joints between 'one' and 'tip' through others: got 'p'"):
         read(tmp_path, text, base="one", platform="tip")
 
 

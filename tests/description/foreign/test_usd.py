@@ -123,7 +123,7 @@ def test_a_cut_stage_is_refused_with_the_line(tmp_path: Path, size: int):
     with pytest.raises(BadRobotFile) as refused:
         load(path)
     assert refused.value.lines() == [
-        f"{path}: OpenUSD cannot read robot.usda from line {len(text.splitlines())} on, allowed: a whole stage"
+        f"{path}: OpenUSD cannot read robot.usda from line {len(text.splitlines())} on: expected a whole stage"
     ]
 
 

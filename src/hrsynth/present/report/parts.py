@@ -71,7 +71,7 @@ def ask(robot: str, question: Callable[[], Answer]) -> Answer | Refused:
 
 def reason(error: HrsynthError, robot: str) -> str:
     """An error in words, without the robot's name before it and what a command line would add."""
-    return (error.what if isinstance(error, BadRequest) else str(error)).removeprefix(f"{robot}: ")
+    return (error.problem if isinstance(error, BadRequest) else str(error)).removeprefix(f"{robot}: ")
 
 
 def error_plane(setup: ObservedRobot, seed: int) -> Accuracy:

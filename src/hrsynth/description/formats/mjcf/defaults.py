@@ -159,7 +159,7 @@ def with_includes(root: xml.Element, file: str) -> xml.Element:
         try:
             content = xml.content(path)
         except BadRobotFile as error:
-            raise refuse(f"an include of what is {error.defects[0].what}", "a file in the model's folder") from None
+            raise refuse(f"an include of what is {error.defects[0].problem}", "a file in the model's folder") from None
         size += len(content)
         if size > LARGEST_FILE:
             raise refuse("included files too large", f"up to {LARGEST_FILE} bytes together")

@@ -226,8 +226,8 @@ class UrdfReader(XmlReader):
                     for key in ("at", "axis", "radius"):
                         self.digits.read(element.get(key, ""))
                 except BadRequest as error:
-                    value = None if error.value is None else str(error.value)
-                    self.defect(xml.line(element), error.what, value, error.allowed)
+                    value = None if error.got is None else str(error.got)
+                    self.defect(xml.line(element), error.problem, value, error.expected)
         return specs, cameras
 
     def check_ends(self, loop: str = "loop") -> None:
