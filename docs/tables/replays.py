@@ -25,10 +25,10 @@ HEADS = (
     "noise",
     "printed",
     "computed",
-    "same ending?",
+    "same outcome?",
     "printed : computed",
     "bound",
-    "word",
+    "remark",
 )
 BENCH_LASTS = 8.0
 """Time constants 1 / λ of a run on the physics bench."""
@@ -73,7 +73,7 @@ def row(replay: Replay) -> tuple[str, ...]:
             here += f", about {_place(Pose(*s.mean))}"
     else:
         here += f" {_place(found.pose)}"
-    noise = "–" if replay.noise is None else replay.noise if "deg" in replay.noise else f"{replay.noise} rad, bench"
+    noise = "–" if replay.noise is None else replay.noise if "deg" in replay.noise else f"{replay.noise} rad, dynamics"
     same = "yes" if found.ended == replay.ended else "no"
     return (
         replay.source,
@@ -94,7 +94,7 @@ def _figures(replay: Replay, found: Servo) -> str:
     if found.spread is None:
         printed = [float(v) for v in replay.said.strip("()").replace("−", "-").split(",")]
         apart = math.dist(printed, [v or 0.0 for v in (found.pose.x, found.pose.y, found.pose.z)])
-        return f"{1e3 * apart:.0f} mm apart"
+        return f"{1e3 * apart:.0f} mm"
     ratios = [
         f"{theirs / mine:.2g} ({unit})"
         for theirs, mine, unit in zip(replay.printed, _error(replay), ("position", "orientation"), strict=True)
