@@ -13,7 +13,7 @@ import hrsynth
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.groups.spatial import translates, translational
 from hrsynth.catalog.words import JointSymbol, LegWord, RobotWord, parse
-from tables import catalog_says as says
+from tables import architectures as says
 
 
 @pytest.mark.slow
