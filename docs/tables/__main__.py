@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from hrsynth.catalog.query import load
 
-from . import catalog, catalog_says, claims, lint_rules, observation_kinds, printed, replays, robots
+from . import architectures, catalog, claims, lint_rules, observation_kinds, printed, replays, robots
 from .markdown import rewrite
 
-PAGES = catalog_says.PAGE.parent
+PAGES = architectures.PAGE.parent
 
 rewrite(PAGES.parents[1] / "robots" / "README.md", {robots.START: robots.table})
 rewrite(
@@ -21,6 +21,6 @@ rewrite(
 rewrite(PAGES / "lint.md", {lint_rules.START: lint_rules.table})
 rewrite(PAGES / "observations.md", {observation_kinds.START: observation_kinds.table})
 rewrite(PAGES / "catalog.md", {catalog.START: catalog.table})
-says = catalog_says.PAGE.read_text(encoding="utf-8")
-catalog_says.PAGE.write_text(catalog_says.written(says, load()), encoding="utf-8", newline="\n")
+shown = architectures.PAGE.read_text(encoding="utf-8")
+architectures.PAGE.write_text(architectures.written(shown, load()), encoding="utf-8", newline="\n")
 (PAGES / "claims.md").write_text(claims.page(), encoding="utf-8", newline="\n")

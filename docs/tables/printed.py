@@ -15,7 +15,7 @@ from .markdown import table as markdown
 from .printed_claims import CLAIMS, FORMS, Place, PrintedClaim, PrintedForm
 
 START = "<!-- generated: printed modes -->"
-HEADS = ("source", "robot", "legs", "printed x, y, z (φ = 0)", "computed x, y, z; φ", "apart", "word")
+HEADS = ("source", "robot", "legs", "printed x, y, z (φ = 0)", "computed x, y, z; φ", "distance", "remark")
 
 FORMS_START = "<!-- generated: printed forms -->"
 FORMS_HEADS = ("source", "real", "hidden, as printed", "robot", "legs", "derived", "as printed?")

@@ -34,7 +34,7 @@ class PrintedClaim:
 
 
 GOAL = "the desired pose itself"
-OFF_PLANE = "at φ = 0 it puts the tip of leg {leg} 88 mm outside the plane of its circle; the second pair has φ = 180°"
+OFF_PLANE = "at φ = 0 it puts the end of leg {leg} 88 mm outside the plane of its circle; the second pair has φ = 180°"
 
 CLAIMS = (
     PrintedClaim(

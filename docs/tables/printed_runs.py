@@ -34,12 +34,10 @@ _ACROSS = ("x=0.02,y=0.1,z=-0.7,phi=0", "x=-0.2,y=0.01,z=-0.7,phi=0")
 _DOWN = ("x=0.05,y=0.05,z=-0.8,phi=0", "x=0.03,y=0.03,z=-0.65,phi=0")
 _RIGID = ("x=0.1,y=0.04,z=-0.93", "x=0,y=-0.25,z=-0.7")
 _RIGID_2 = ("x=0.1,y=0.04,z=-0.93", "x=0,y=-0.3,z=-0.85")
-_TURNS = (
-    "in position: this noise averages out except for a shift in z, see below; in orientation the order is as printed"
-)
-_HELD = "not a mode, but this noise holds the run there; without noise it continues to the goal"
+_TURNS = "in position: this noise averages out except for a shift in z; in orientation the order is as printed"
+_HELD = "not a mode, but this noise keeps the run near it; without noise it continues to the goal"
 _PERSISTS = "about the size of the bound: of errors that do not average out"
-_AVERAGED = "this noise averages out; errors of the experiment persist, see below"
+_AVERAGED = "this noise averages out; errors of the experiment persist"
 _NEAR_MODE = "(0.03, 0.03, −0.65) is not a mode: two of its directions are 0.5° off"
 
 

@@ -73,7 +73,7 @@ def row(replay: Replay) -> tuple[str, ...]:
             here += f", about {_place(Pose(*s.mean))}"
     else:
         here += f" {_place(found.pose)}"
-    noise = "–" if replay.noise is None else replay.noise if "deg" in replay.noise else f"{replay.noise} rad, bench"
+    noise = "–" if replay.noise is None else replay.noise if "deg" in replay.noise else f"{replay.noise} rad, dynamics"
     same = "yes" if found.outcome == replay.ended else "no"
     return (
         replay.source,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from hrsynth.analysis.verdict import CONTROLLABLE
 from hrsynth.catalog.query import Catalog, load
-from tables.catalog_says import VERDICTS, share, studied, written
+from tables.architectures import VERDICTS, share, studied, written
 from tables.markdown import table
 
 from .tables import ROBOT

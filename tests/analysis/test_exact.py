@@ -319,7 +319,7 @@ def test_axes_that_are_not_quite_parallel() -> None:
 
 
 def test_six_rods_that_meet_one_line() -> None:
-    """SS rods that meet one line let the platform turn about it for an instant, and no further (theory.md 12)."""
+    """SS rods that meet one line let the platform turn about it for an instant, and no further (proofs.md 12)."""
     rng = np.random.default_rng(2)
     builder = Builder("hexapod")
     builder.link("base")

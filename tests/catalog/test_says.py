@@ -13,7 +13,7 @@ import hrsynth
 from hrsynth.catalog.architecture_key import ArchitectureKey, JointSymbol, LegKey, parse
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.groups.spatial import translates, translational
-from tables import catalog_says as says
+from tables import architectures as says
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""Exact verdicts of an architecture: ranks over the rationals at random instances (docs/pages/theory.md, section 12).
+"""Exact verdicts of an architecture: ranks over the rationals at random instances (docs/pages/proofs.md, section 12).
 
 F is the irreducible family of geometries with all relations that persist in the robot's motion, an instance one of its
 rational members. With A the constraints, X the platform's twist and Y the rates of the directions, the legs see

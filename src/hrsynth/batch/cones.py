@@ -1,4 +1,4 @@
-"""How far the platform can be off when each direction is off by up to its cone's half-angle (docs/pages/theory.md,
+"""How far the platform can be off when each direction is off by up to its cone's half-angle (docs/pages/proofs.md,
 section 10).
 
 With B_i = ψ_i² A_i A_iᵀ (A_i: from the error of direction i to the platform's), the largest error is the maximum over

@@ -1,4 +1,4 @@
-"""From Mᵀ to the largest errors of position and orientation (docs/pages/theory.md, section 10)."""
+"""From Mᵀ to the largest errors of position and orientation (docs/pages/proofs.md, section 10)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Six conditions on points of a rigid body, written so that as many solutions are enclosed as there can be (theory.md,
+"""Six conditions on points of a rigid body, written so that as many solutions are enclosed as there can be (proofs.md,
 section 10).
 
 Where rods share balls, or tips are on circles and lines, some of the 40 solutions are multiple ones at infinity. Moved

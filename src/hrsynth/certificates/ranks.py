@@ -1,4 +1,4 @@
-"""The certificate of a verdict in exact arithmetic: the ranks at one rational instance (docs/pages/theory.md, 12)."""
+"""The certificate of a verdict in exact arithmetic: the ranks at one rational instance (docs/pages/proofs.md, 12)."""
 
 from __future__ import annotations
 

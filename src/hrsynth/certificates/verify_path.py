@@ -4,7 +4,7 @@ The platform has *motions*: a point starts from `origin` and moves along some ve
 `home` about no axis, one, or three. Poses are written in coordinates of these motions, so no pose leaves them: a factor
 for each vector; and w and a factor for each axis, the quaternion w + the sum of factors times axes, of any length. On a
 path all of these go straight from pose to pose. Each leg is in closed form: its tip, a vector of the pose, decides what
-it carries in its *working mode*, as long as the leg reaches (theory.md, section 9).
+it carries in its *working mode*, as long as the leg reaches (proofs.md, section 9).
 
 *same aspect*: on each piece, the coordinates and all that follows are enclosed in intervals whose ends are rounded
 outwards to multiples of 2^-96. All legs reach, in the working modes of the file, and the condition, an expression in

@@ -1,5 +1,5 @@
 """A proved branch as code needs it: independent parts, each with cells of motor coordinates and an affine tube in each,
-in metres and radians (docs/pages/theory.md, section 12)."""
+in metres and radians (docs/pages/proofs.md, section 12)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The special relations of a mechanism's geometry that persist in motion: what its architecture prescribes.
 
 Instantaneous kinematics depends on joint centres, joint axes and observed directions alone. A relation between them is
-proposed if it holds at every configuration given (docs/pages/theory.md, section 12); what holds by accident at one of
+proposed if it holds at every configuration given (docs/pages/proofs.md, section 12); what holds by accident at one of
 them does not. Which of those proposed follow from the file is another question (:mod:`.carried`,
 :mod:`hrsynth.analysis.loop_invariants`). All relations are of two kinds, so that geometry can be drawn anew in linear
 steps: a direction is normal to earlier ones, or in the plane of two earlier ones; a sum of centres ±P_j is zero,
@@ -151,7 +151,7 @@ def recognise(
 
 
 def _doubt(sieve: Sieve) -> str:
-    """Why what a sieve kept is not to be relied on (docs/pages/theory.md, section 12)."""
+    """Why what a sieve kept is not to be relied on (docs/pages/proofs.md, section 12)."""
     if sieve.mixed is not None:
         return (
             "the samples are of several operation modes: a relation of its geometry holds at zero and at "

@@ -1,6 +1,6 @@
 """All assembly modes → what a picture of them shows, as points in the base frame (m).
 
-Which curves and surfaces are drawn follows from how the platform moves (theory.md 8; MMT Figs. 5, 7, 11, 15).
+Which curves and surfaces are drawn follows from how the platform moves (proofs.md 8; MMT Figs. 5, 7, 11, 15).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Where a run ended, in the words of docs/pages/theory.md, section 11: goal, mode, antipodal, local minimum, boundary,
+"""Where a run ended, in the words of docs/pages/proofs.md, section 11: goal, mode, antipodal, local minimum, boundary,
 lost from sight, time; or undecided."""
 
 from __future__ import annotations

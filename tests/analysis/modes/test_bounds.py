@@ -1,4 +1,4 @@
-"""The bounds on the number of modes (MMT 4.1.2, 4.2; theory.md 8) are reached, by whole robots, and never passed."""
+"""The bounds on the number of modes (MMT 4.1.2, 4.2; proofs.md 8) are reached, by whole robots, and never passed."""
 
 from __future__ import annotations
 

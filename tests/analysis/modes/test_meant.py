@@ -91,7 +91,7 @@ def by_newton(system: Spatial, starts: int, rng: np.random.Generator) -> list[Ar
 
 @pytest.mark.parametrize("seed", range(4))
 def test_lines_of_one_plane_count_as_such_though_rounding_tilts_them(seed: int):
-    """Four modes instead of eight: the others are at infinity (docs/pages/theory.md, section 8)."""
+    """Four modes instead of eight: the others are at infinity (docs/pages/proofs.md, section 8)."""
     rng = np.random.default_rng(seed)
     R, G, p = random_rotation(rng), random_rotation(rng), rng.normal(size=3)
     tips = rng.normal(size=(3, 3))

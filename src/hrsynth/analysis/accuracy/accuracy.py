@@ -154,7 +154,7 @@ def accuracy(
     """How far the platform can be off if what is observed is off by given amounts.
 
     The largest position and orientation error of the platform over all errors of what is observed, to first order
-    (docs/pages/theory.md, section 10; MMT A.1): max over unit w of Σ ψ_i ‖(J_i P_i)ᵀ w‖, J = M^{T+}.
+    (docs/pages/proofs.md, section 10; MMT A.1): max over unit w of Σ ψ_i ‖(J_i P_i)ᵀ w‖, J = M^{T+}.
 
     ``cone`` is the half-angle of the cones about directions, one for all legs or one per leg; ``noise`` gives the
     errors of other kinds, as ``0.3px,1mm,0.1deg`` (also of directions without a cone). The poses are ``at``, those over

@@ -1,6 +1,6 @@
 """The pose at which a controller rests when its directions are wrong, followed from the pose where they are right.
 
-The law rests at critical points of F = ½ Σ ‖u_i × û_i‖² over the closed configurations (theory.md 11), of other kinds
+The law rests at critical points of F = ½ Σ ‖u_i × û_i‖² over the closed configurations (proofs.md 11), of other kinds
 of observations with the error e_i of each kind. û_i(s) is u_i turned by the part s of its error. At s = 0 the pose
 itself is a strict minimum, F = 0, where all freedoms are seen; by
 the implicit function theorem it goes on as one smooth curve of strict minima while the Hessian of F is positive

@@ -1,4 +1,4 @@
-"""The atlas of the modes with the directions at one pose: which two lie in one aspect (docs/pages/theory.md 9).
+"""The atlas of the modes with the directions at one pose: which two lie in one aspect (docs/pages/proofs.md 9).
 
 To lie in one aspect is an equivalence: a path from one mode to another and one from there to a third join the first and
 the third, and what separates two modes separates all that are joined to them. So few pairs are asked for, those first

@@ -1,4 +1,4 @@
-"""Whether two poses lie in one aspect: joined by a certified path, separated by a proof, or undecided (theory.md 9)."""
+"""Whether two poses lie in one aspect: joined by a certified path, separated by a proof, or undecided (proofs.md 9)."""
 
 from __future__ import annotations
 
@@ -489,7 +489,7 @@ def path(
 ) -> PathAnswer:
     """Whether a path without Type 2 singularity joins two poses, with a proof: same aspect, separated, undecided.
 
-    Whether a path without Type 2 singularity of the hidden robot joins two poses (docs/pages/theory.md, section 9).
+    Whether a path without Type 2 singularity of the hidden robot joins two poses (docs/pages/proofs.md, section 9).
     Its condition is that of the real robot's relation, which is the exact lift's (theory.md 3). The path passes only
     through poses at which everything seen has a value, in front of the camera or not.
 

@@ -1,5 +1,5 @@
 """The poses at which one leg of three cranks has its watched direction: a surface that holds all modes, the curve of
-Type 2 singularities on it, and its image among the other two directions, with cusps and nodes (theory.md, section 9).
+Type 2 singularities on it, and its image among the other two directions, with cusps and nodes (proofs.md, section 9).
 
 Cranks w_k about A_k carry rods e_k to the corners T_k = A_k + w_k + e_k = T₀ + r_k, r_k = b_k exp(iφ), k = 0, 1, 2;
 e₀ is held. With n_k = w₀ × w_k and m_k = r_k × w_k the lines through T_k along w_k meet, or are parallel, where

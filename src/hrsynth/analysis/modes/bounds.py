@@ -1,4 +1,4 @@
-"""How many poses of a rigid body six conditions on its points leave, at most (docs/pages/theory.md, section 8).
+"""How many poses of a rigid body six conditions on its points leave, at most (docs/pages/proofs.md, section 8).
 
 A pose is a point (h : M : x : y : r) of P¹⁶ with M = h R, x = h Rᵀp, y = h p, r = h |p|². Such points and their limits
 are an irreducible variety X of dimension 6 and degree 40 (M. Gallet, G. Nawratil, J. Schicho, J. Geom. 106, 2015;

@@ -1,5 +1,5 @@
 """A platform that one leg of R and P carries, the other legs being conditions on its pose, as that of an ankle whose
-two axes do not meet (docs/pages/theory.md, section 8).
+two axes do not meet (docs/pages/proofs.md, section 8).
 
 With x = o + (c (1 - a aᵀ) + a aᵀ + s [a]ₓ)(y - o) for a turn about a through o, c² + s² = 1, a condition is a
 polynomial of known degree d in each c, s: of degree 2 d in the tangent of the half-angle. As many conditions as the leg

@@ -1,4 +1,4 @@
-"""All poses of a rigid body under six conditions on its points, proposed by a homotopy (theory.md, section 8).
+"""All poses of a rigid body under six conditions on its points, proposed by a homotopy (proofs.md, section 8).
 
 In Study's coordinates (e, g) such conditions are combinations of seventeen quadrics, so that six with random complex
 coefficients (a *section*, with 40 solutions, which are kept in a file) can be moved to the wanted ones along a straight

@@ -1,4 +1,4 @@
-"""Solutions at infinity of six conditions on points of a rigid body, enclosed (docs/pages/theory.md, section 8).
+"""Solutions at infinity of six conditions on points of a rigid body, enclosed (docs/pages/proofs.md, section 8).
 
 With g = g' + k e and e·g = 0, x and y (:mod:`.bounds`) are those of e and g', and r = 4 (g'·g' − κ) with
 κ e·e = (e·g')². So (e, g', κ), e up to a factor and g' up to a multiple of e, are coordinates of X wherever M is not

@@ -1,5 +1,5 @@
 """All closings of a platform that a leg carries: how many at most, by ranks modulo a prime, and all of them proposed by
-linear algebra (docs/pages/theory.md, section 8).
+linear algebra (docs/pages/proofs.md, section 8).
 
 A turn is that of the quaternion y + z a with (y : z) in a projective line, but for w = y² + z² a·a = 0; a slide is
 z / y, w = y. Conditions on the joints are forms of a degree in each line. With W the product of all w, I_t the

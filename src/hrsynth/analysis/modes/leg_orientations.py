@@ -2,7 +2,7 @@
 
 Two cones with one apex meet in two lines, so a direction that is held behind two axes has two solutions; so have three
 axes between two bodies that do not turn. Only necessary conditions are used: what is not found here is left open, never
-excluded, so no branch with real orientations is lost (docs/pages/theory.md, section 8).
+excluded, so no branch with real orientations is lost (docs/pages/proofs.md, section 8).
 
 Each solution comes with its *gain*: an error ε of all directions of the chain (rad) makes one of at most gain · ε, to
 first order, in the orientations. That of the goal's own is 1: nothing is computed for it.

@@ -264,7 +264,7 @@ def modes(
     """Assembly modes: poses of the platform with the same measurements, and whether they are proved to be all.
 
     All poses with what is observed at ``at`` (default: the zero configuration), or with ``real`` the motors'
-    coordinates: complex solutions counted, real ones enclosed (theory.md 8; MMT 3.3, 4.1.2, 4.2).
+    coordinates: complex solutions counted, real ones enclosed (proofs.md 8; MMT 3.3, 4.1.2, 4.2).
 
     A Π stays a parallelogram, never crossed (except in planar mechanisms that are closed loop by loop, and in
     searches); if legs or measurements keep the platform from turning, turned poses (another operation mode) are not

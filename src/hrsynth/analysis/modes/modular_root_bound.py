@@ -1,5 +1,5 @@
 """At most how many zeros quadrics with integer coefficients have: ranks of their multiples modulo a prime
-(docs/pages/theory.md, section 8).
+(docs/pages/proofs.md, section 8).
 
 Linear combinations without a quadratic part give unknowns by others, exactly. B are the monomials whose degree in each
 of some groups of unknowns is below a cap, S those at a cap; rows are all multiples of the quadrics within the caps. If

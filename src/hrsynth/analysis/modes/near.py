@@ -1,4 +1,4 @@
-"""Near modes: poses that a measurement with an error cannot tell from the goal (docs/pages/theory.md, section 8).
+"""Near modes: poses that a measurement with an error cannot tell from the goal (docs/pages/proofs.md, section 8).
 
 Lists of modes are of the numbers as they are. Where more is observed than needed, a mode of exact dimensions is none of
 rounded ones, but what is measured there differs by no more than the rounding, and the loop rests there as before.

@@ -1,5 +1,5 @@
 """What is seen of the platform from the base, or of the base from the platform, as curves and surfaces on which points
-are, angles that directions keep, and conditions on a pose (docs/pages/theory.md, section 8).
+are, angles that directions keep, and conditions on a pose (docs/pages/proofs.md, section 8).
 
 Lines, planes and axes count without their sense: a pose at which a value is the opposite one is *antipodal*, no mode.
 """

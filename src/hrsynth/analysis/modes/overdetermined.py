@@ -1,4 +1,4 @@
-"""Which solutions of a square part fit the legs that it leaves out, where more is observed than needed (theory.md 8).
+"""Which solutions of a square part fit the legs that it leaves out, where more is observed than needed (proofs.md 8).
 
 A solution is *excluded* where the tips of its enclosure are off what a leg can reach, in ball arithmetic. That it is a
 mode is proved only of the goal, at which all tips fit by construction: a match in floats proves nothing.

@@ -1,4 +1,4 @@
-"""The loops of a planar mechanism as polynomials, whatever its gears (docs/pages/theory.md, section 8).
+"""The loops of a planar mechanism as polynomials, whatever its gears (docs/pages/proofs.md, section 8).
 
 Links turn by θ = E ψ, E of whole numbers: slides, gears and what is measured are relations between angles. With
 u = exp(i ψ), v = 1/u each loop is a sum of a t Π u^E = 0, t a slide's length or 1, and so is its conjugate, with u and

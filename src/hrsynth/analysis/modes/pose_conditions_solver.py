@@ -1,4 +1,4 @@
-"""All modes of a rigid platform from the conditions of its legs (docs/pages/theory.md, section 8).
+"""All modes of a rigid platform from the conditions of its legs (docs/pages/proofs.md, section 8).
 
 At least so many as boxes are apart from each other, complex ones too; at most as the degrees allow.
 """

@@ -1,4 +1,4 @@
-"""All modes of one loop of up to five free R and P, as a paradoxical linkage with a joint driven (docs/pages/theory.md,
+"""All modes of one loop of up to five free R and P, as a paradoxical linkage with a joint driven (docs/pages/proofs.md,
 section 8).
 
 In dual quaternions a joint is c + s h, h that of its axis. The loop is g₃ g₄ g₅ = λ (g₁ g₂)⁻¹ with c₁ c₂, s₁ c₂, c₁ s₂,

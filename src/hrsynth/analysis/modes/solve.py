@@ -339,7 +339,7 @@ def _same(system: System, q: Array, goal: Array) -> bool:
 
 
 def _bound(system: System, part: PoseSystem, most: Bound | None, roots: SolutionSet) -> tuple[str, str]:
-    """By what there are no more solutions than a solver proposes, and the proof in words (theory.md 8)."""
+    """By what there are no more solutions than a solver proposes, and the proof in words (proofs.md 8)."""
     proof = _proof(system, roots)
     known = f", {roots.beyond} enclosed at infinity" if roots.beyond else ""
     known += f", the {roots.far} far ones for the rounded geometry" if roots.far else ""

@@ -93,7 +93,7 @@ def equilibria(
     attract.
 
     ``observe``, ``camera`` and ``sensor`` are as for ``derive``; each kind of observation has its error. The law rests
-    exactly at the critical points of ½ ‖e‖² on the closed loops (theory.md 11); those at which a camera does not see
+    exactly at the critical points of ½ ‖e‖² on the closed loops (proofs.md 11); those at which a camera does not see
     what it has to see are left out. They are sought from random walks on the branch of the zero configuration.
     ``complete``: try to prove that they are all, by subdivision of a box of platform poses (seconds to minutes) into
     ``max_boxes`` boxes at most; where these are many, so many processes share them (``jobs``, by default one per core),

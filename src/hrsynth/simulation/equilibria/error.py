@@ -3,7 +3,7 @@ gradients and Hessians, for many floats or affine forms at once.
 
 The law commands q̇ = −λ B (L U B)⁺ e with B a basis of the motions of the closed loops: it rests exactly where
 Bᵀ ∇E = 0, at the critical points of E on the configurations G(q) = 0. With multipliers these are the zeros of
-∇E + DGᵀ μ beside G (docs/pages/theory.md, section 11). Of a direction e = u × u_d, so that its part of E is
+∇E + DGᵀ μ beside G (docs/pages/proofs.md, section 11). Of a direction e = u × u_d, so that its part of E is
 ½ (1 − (u · u_d)²).
 """
 

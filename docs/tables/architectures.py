@@ -1,4 +1,4 @@
-"""What the catalog says, as tables and as rules that need no computation, on the page docs/pages/catalog_says.md."""
+"""The catalog as tables, and as rules that need no computation, on the page docs/pages/architectures.md."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hrsynth.catalog.query import Catalog
 
 from .markdown import replace_between, table
 
-PAGE = Path(__file__).resolve().parents[1] / "pages" / "catalog_says.md"
+PAGE = Path(__file__).resolve().parents[1] / "pages" / "architectures.md"
 VERDICTS = (CONTROLLABLE, PARTIAL, BLIND)
 INFINITY, RAIL, GENERAL = "line at infinity", "line across the rails", "line in general position"
 Record = Mapping[str, Any]
@@ -132,7 +132,7 @@ def fewest(catalog: Catalog) -> str:
         (motion, group, least, *(f"{found[k]:,}" if found[k] else "–" for k in range(4)))
         for (motion, group, least), found in sorted(by.items())
     ]
-    return table(("motion", "group", "at least", "so many", "one more", "two more", "three more"), rows, 1)
+    return table(("motion", "group", "bound", "as the bound", "one more", "two more", "three more"), rows, 1)
 
 
 def chains(catalog: Catalog) -> str:
@@ -171,11 +171,11 @@ def rules(catalog: Catalog) -> str:
     every = studied(catalog)
     rows = [
         (
-            "planar: rank of the lines of centres",
+            "planar: rank of the lines of instantaneous centres",
             agree(planar_rank(parse(each["word"])) == each["rank"] for each in every if each["group"] == "planar"),
         ),
         (
-            "deltas: slides not all parallel, enough legs",
+            "deltas: P not all parallel, at least dof/2 legs",
             agree(
                 delta_controllable(parse(each["word"]), each["dof"]) == (each["verdict"] == CONTROLLABLE)
                 for each in every
@@ -183,7 +183,7 @@ def rules(catalog: Catalog) -> str:
             ),
         ),
         (
-            "legs that translate: directions of R on both sides of the watched link",
+            "translating legs: directions of R on both sides of the observed link",
             agree(
                 translation_rank(word) == each["rank"]
                 for each in every
@@ -192,14 +192,14 @@ def rules(catalog: Catalog) -> str:
             ),
         ),
         (
-            "at least dof/2 legs, in a plane dof",
+            "all: at least dof/2 legs, in a plane dof",
             agree(each["fewest"] >= numbers(each) for each in every if each["verdict"] == CONTROLLABLE),
         ),
     ]
     return table(("rule", "agree"), rows, 1)
 
 
-TABLES = {"motions": motions, "fewest": fewest, "chains": chains, "cures": cures, "rules": rules}
+TABLES = {"motions": motions, "fewest": fewest, "chains": chains, "suggestions": cures, "rules": rules}
 
 
 def start(name: str) -> str:
