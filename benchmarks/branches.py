@@ -1,5 +1,5 @@
 """How large a box of motors `hrsynth branch` proves whole for each shipped robot, and in what time: the table of
-docs/pages/branch.md.
+docs/pages/prove_a_branch.md.
 
     python benchmarks/branches.py [SECONDS [ROBOT...]] > table.md
 

@@ -392,8 +392,8 @@ MIXED = """<robot name="mixed">
 
 @pytest.fixture
 def page() -> str:
-    """The file that docs/pages/formations.md shows."""
-    path = Path(__file__).parents[2] / "docs" / "pages" / "formations.md"
+    """The file that docs/pages/control_a_formation.md shows."""
+    path = Path(__file__).parents[2] / "docs" / "pages" / "control_a_formation.md"
     return path.read_text(encoding="utf-8").split("```xml\n")[1].split("```")[0]
 
 

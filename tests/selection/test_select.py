@@ -366,8 +366,8 @@ BODY = """<robot name="body"><link name="base"/><link name="platform"/>
 
 @pytest.mark.slow
 def test_sets_of_points_are_ranked_by_what_attracts_their_loops(tmp_path: Path) -> None:
-    """The loop on the corners of a tilted square is drawn to another pose as well (docs/pages/endings.md), that on
-    three of them too; with a fifth point off the plane it is not, and such sets come first though less accurate."""
+    """The loop on the corners of a tilted square is drawn to another pose as well, that on three of
+    them too; with a fifth point off the plane it is not, and such sets come first though less accurate."""
     body = tmp_path / "body.urdf"
     body.write_text(BODY)
     sensor = [f"point:platform@{at}" for at in ("0.1,0.1,0", "-0.1,0.1,0", "-0.1,-0.1,0", "0.1,-0.1,0", "0,0,0.1")]

@@ -2,8 +2,8 @@
 
 A motion that changes no measured value is *trivial* where one similarity (v, ω, s) takes everything along that is
 sensed: v(x) = v + ω × x + s x for points, turns by ω, whatever the poses are. What is left are flexes
-(docs/pages/formations.md). What an observation senses of a link are the wrenches that it transmits when it is held,
-over all places of the other link: a rule for all kinds, in floating point and over the rationals.
+(docs/pages/control_a_formation.md). What an observation senses of a link are the wrenches that it transmits when it is
+held, over all places of the other link: a rule for all kinds, in floating point and over the rationals.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 A *ray* lets a tip B move along a line r: an image point, a leg whose direction is watched. A *plane* lets B move in a
 plane of normal n, and the body turn about the normals of an axis e: a line in the image. An *axis* u lets the body turn
 about it alone: a direction, an inclination. Each condition is the determinant of the wrenches, up to a constant
-(docs/pages/observations.md has the derivations).
+(docs/pages/proofs.md has the derivations).
 """
 
 from __future__ import annotations

@@ -1,2 +1,2 @@
 """From motors to joints: the branch of the zero configuration, proved over cells of motor coordinates
-(docs/pages/branch.md)."""
+(docs/pages/prove_a_branch.md)."""

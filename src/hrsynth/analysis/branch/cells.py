@@ -8,7 +8,7 @@ by affine forms in the noise symbols ε = (q − q_c) / h. With Y about A⁻¹ K
 
 if it lies inside [−r, r] for all ε, there is for each q exactly one zero in the tube, analytic in q, and every matrix
 in A is regular. Source: A. Neumaier, Interval Methods for Systems of Equations, 1990, section 5.2;
-docs/pages/branch.md.
+docs/pages/prove_a_branch.md.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ F' = y_q + y_x φ', and A φ' = −B with the matrices of :mod:`.cells`: for the
 For q, q' in a convex box F(q) − F(q') = M (q − q'), each row of M a mean of F' along the way. So if |1 − Z F'| v < v
 for a fixed Z, some v > 0 and all F' over the box, no two motors in it have one pose, and no F' loses rank (Type 1).
 Where a box is too large for this it is halved, and the poses of both halves are kept apart. Source: A. Neumaier,
-Interval Methods for Systems of Equations, 1990, sections 5.1 and 5.2; docs/pages/branch.md.
+Interval Methods for Systems of Equations, 1990, sections 5.1 and 5.2; docs/pages/prove_a_branch.md.
 """
 
 from __future__ import annotations

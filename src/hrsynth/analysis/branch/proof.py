@@ -53,7 +53,7 @@ def branch(robot: RobotLike, box: MotorBox = None, *, max_cells: Cells = BRANCH_
     that ends.
 
     Where the passive coordinates are proved to be one continuous function of the motors, on the branch of the zero
-    configuration (docs/pages/branch.md).
+    configuration (docs/pages/prove_a_branch.md).
 
     ``box`` gives the motors' intervals (m, rad), as a mapping or as text ``hip=-1:1,slide=0:0.2``; the default is the
     file's limits or, without them, a whole turn, or a characteristic length either way. ``max_cells`` is the largest

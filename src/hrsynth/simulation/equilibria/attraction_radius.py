@@ -1,4 +1,4 @@
-"""The certified radius: from how far around a goal every start is proved to end there (docs/pages/endings.md).
+"""The certified radius: from how far around a goal every start is proved to end there (docs/pages/proofs.md).
 
 In cones about the goal the error E = ½‖e‖² is proved to rise along every ray until it is at least c. Then no run, along
 which E falls, leaves the component of {E < c} that holds the goal; the goal is its only critical point; and all starts

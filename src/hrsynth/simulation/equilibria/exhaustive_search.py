@@ -1,5 +1,5 @@
 """All critical points of the error in a box of platform poses, or at all poses, by subdivision
-(docs/pages/endings.md)."""
+(docs/pages/proofs.md)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Balls about a goal into which the law without damping leads from every pose in them (docs/pages/endings.md).
+"""Balls about a goal into which the law without damping leads from every pose in them (docs/pages/proofs.md).
 
 With x the pose from the goal's, e the error and J its rates the law moves the platform by ẋ = −J⁺ e. With J of full
 rank and e = J x − d that is −(x − J⁺ d), so that |x| falls along every run where x · J⁺ d < |x|²: then none leaves a
