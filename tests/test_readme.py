@@ -13,7 +13,7 @@ import pytest
 
 from hrsynth.cli import execute
 from hrsynth.description import list_robots
-from tables import catalog, observation_kinds, replays, robots
+from tables import catalog, closures, observation_kinds, replays, robots
 from tables.markdown import block, line, replace_between
 from tables.printed_runs import REPLAYS, SIMULATED
 
@@ -69,6 +69,12 @@ def test_the_table_of_kinds_is_fresh():
     assert block(page, observation_kinds.START) == observation_kinds.table(), "the page is stale: make readme"
 
 
+def test_the_tables_of_closures_are_fresh():
+    page = (PAGES / "closures.md").read_text(encoding="utf-8")
+    for start, made in ((closures.START, closures.table()), (closures.WRITTEN_START, closures.written_table())):
+        assert block(page, start) == made, "the page is stale: make readme"
+
+
 @pytest.mark.slow
 def test_the_table_of_the_catalog_is_fresh():
     assert block(CATALOG, catalog.START) == catalog.table(), "the page is stale: make readme"
@@ -95,7 +101,7 @@ def test_the_python_example_runs_and_prints_what_it_says():
     assert output.getvalue().splitlines() == said
 
 
-@pytest.mark.parametrize("page", ["pinocchio.md", "joints.md"])
+@pytest.mark.parametrize("page", ["use_pinocchio.md", "poses_by_joints.md"])
 def test_the_program_of_a_page_runs_and_prints_what_it_says(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     pytest.importorskip("mujoco")
     monkeypatch.chdir(tmp_path)

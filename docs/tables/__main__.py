@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from hrsynth.catalog.query import load
 
-from . import architectures, catalog, claims, lint_rules, observation_kinds, printed, replays, robots
+from . import architectures, catalog, claims, closures, lint_rules, observation_kinds, printed, replays, robots
 from .markdown import rewrite
 
 PAGES = architectures.PAGE.parent
@@ -18,7 +18,8 @@ rewrite(
         replays.START: replays.table,
     },
 )
-rewrite(PAGES / "lint.md", {lint_rules.START: lint_rules.table})
+rewrite(PAGES / "lint_rules.md", {lint_rules.START: lint_rules.table})
+rewrite(PAGES / "closures.md", {closures.START: closures.table, closures.WRITTEN_START: closures.written_table})
 rewrite(PAGES / "observations.md", {observation_kinds.START: observation_kinds.table})
 rewrite(PAGES / "catalog.md", {catalog.START: catalog.table})
 shown = architectures.PAGE.read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The table of the rules of ``lint``, on the page docs/pages/lint.md."""
+"""The table of the rules of ``lint``, on the page docs/pages/lint_rules.md."""
 
 from __future__ import annotations
 

@@ -419,7 +419,7 @@ def test_random_robots_in_tilted_bases(seed: int) -> None:
 
 @pytest.mark.slow
 def test_the_page_s_loop_runs(tmp_path: Path) -> None:
-    page = (Path(__file__).parents[2] / "docs" / "pages" / "export.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "pages" / "export_a_controller.md").read_text(encoding="utf-8")
     loop = page.split("```cpp\n")[1].split("```")[0]
     assert sum(bool(line.strip()) for line in loop.splitlines()) < 25
     robot = hrsynth.load("rrrrr_m1")

@@ -26,7 +26,7 @@ from hrsynth.mechanism.observations import kinds
 from hrsynth.mechanism.observations.encoder import Encoder
 from strategies import random_direction, random_rotation
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "pages" / "files.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "pages" / "robot_file.md"
 BODY = """<robot name="body">
   <link name="base"/> <link name="object"/>
   <joint name="free" type="floating"> <parent link="base"/> <child link="object"/> <origin xyz="0.1 0.2 1"/> </joint>

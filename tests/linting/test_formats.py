@@ -273,7 +273,7 @@ def test_a_file_that_cannot_be_written_is_left_as_it_is(bad: Path, capsys):
 
 
 def test_the_page_of_rules_is_fresh():
-    text = (ROOT / "docs" / "pages" / "lint.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "pages" / "lint_rules.md").read_text(encoding="utf-8")
     assert block(text, page.START) == page.table(), "the page is stale: make readme"
 
 

@@ -94,9 +94,9 @@ def test_a_usd_file_of_single_precision_is_the_same(name: str, tmp_path: Path):
 @pytest.mark.timeout(7200)
 @pytest.mark.parametrize(("decimals", "significant"), [*((each, False) for each in DECIMALS), (6, True), (5, True)])
 def test_the_whole_table(decimals: int, significant: bool, tmp_path: Path):
-    """docs/pages/files.md, "Rounded numbers": all down to five decimals, and with four all but one in a hundred; else
-    refused. Of few significant digits a native file with few numbers does not tell: its loops are closed by moving
-    joints."""
+    """docs/pages/repair_a_file.md, "Rounded numbers": all down to five decimals, and with four all but one in a
+    hundred; else refused. Of few significant digits a native file with few numbers does not tell: its loops are closed
+    by moving joints."""
     count = refused = 0
     endings = ENDINGS | ({"usd": ".usda"} if importlib.util.find_spec("pxr") else {})
     for name in list_robots():
