@@ -62,6 +62,8 @@ def command(name: str) -> str:
         return f"hrsynth {what.command} {what.robot}.urdf -o {name}"
     if isinstance(what, Screen):
         return f"hrsynth studio {what.robot}"
+    if isinstance(what, Drawing):
+        return f"python docs/figures.py {what.figure}"
     if name.startswith("derivation_"):
         robot, legs = what.split()
         return f'hrsynth.draw(hrsynth.derive("{robot}", observe="{legs}"))'
@@ -92,7 +94,14 @@ class Screen:
     panel: str
 
 
-PICTURES: dict[str, str | Page | SitePage | Family | Screen] = {
+@dataclass(frozen=True)
+class Drawing:
+    """A figure of ``docs/figures.py``, by its name there."""
+
+    figure: str
+
+
+PICTURES: dict[str, str | Page | SitePage | Family | Screen | Drawing] = {
     "accuracy_quattro.png": "accuracy quattro --observe 1,4 --cone 0.1deg --plane z=-0.7",
     "atlas_six_poses.png": Family("aspects", "six_poses"),
     "basins_quattro.png": "basins quattro --observe 1,4 --goal x=0,y=0,z=-0.7,phi=0 --plane z=-0.7,phi=0",
@@ -101,6 +110,11 @@ PICTURES: dict[str, str | Page | SitePage | Family | Screen] = {
     ),
     "catalog_page.png": Page("catalog site --group planar --legs '3-R*RR'", "-o", 1250, 1100, "p/96081be379a6.html"),
     "derivation_quattro.svg": "quattro 1,4",
+    "glossary_aspect.svg": Drawing("aspect"),
+    "glossary_assembly_mode.svg": Drawing("assembly_mode"),
+    "glossary_branch.svg": Drawing("branch"),
+    "glossary_equilibrium.svg": Drawing("equilibrium"),
+    "glossary_working_mode.svg": Drawing("working_mode"),
     "modes_3rrr.png": "modes 3rrr_m1",
     "modes_delta.png": "modes delta",
     "modes_delta_real.png": "modes delta --real",
@@ -163,6 +177,10 @@ def made(name: str) -> None:
         import panels
 
         panels.screen(what.robot, what.panel, file)
+    elif isinstance(what, Drawing):
+        import figures
+
+        figures.draw(what.figure)
     elif name.startswith("derivation_"):
         robot, legs = what.split()
         hrsynth.draw(hrsynth.derive(hrsynth.load(robot), legs.split(","))).save(str(file))

@@ -112,6 +112,16 @@ def test_the_program_of_a_page_runs_and_prints_what_it_says(page: str, tmp_path:
     assert all(itertools.starmap(_alike, zip(said, output.getvalue().splitlines(), strict=True)))
 
 
+@pytest.mark.slow
+def test_the_tutorial_of_an_own_file_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    page = (PAGES / "own_file.md").read_text(encoding="utf-8")
+    Path("arm.urdf").write_text(re.search(r"```xml\n(.*?)```", page, re.DOTALL)[1], encoding="utf-8")
+    commands = re.findall(r"^hrsynth (.*)", page, re.MULTILINE)
+    assert len(commands) > 8
+    assert [command for command in commands if execute(shlex.split(command))] == []
+
+
 @pytest.mark.some(1)
 @pytest.mark.parametrize(
     "command",
