@@ -20,7 +20,7 @@ rewrite(
 )
 rewrite(PAGES / "lint.md", {lint_rules.START: lint_rules.table})
 rewrite(PAGES / "observations.md", {observation_kinds.START: observation_kinds.table})
-rewrite(PAGES / "catalog.md", {catalog.START: catalog.table})
+rewrite(PAGES / "find_an_architecture.md", {catalog.START: catalog.table})
 says = catalog_says.PAGE.read_text(encoding="utf-8")
 catalog_says.PAGE.write_text(catalog_says.written(says, load()), encoding="utf-8", newline="\n")
 (PAGES / "claims.md").write_text(claims.page(), encoding="utf-8", newline="\n")
