@@ -70,6 +70,12 @@ HEAD = (
 """The lines before the claims."""
 
 
+def indent_lines(text: str) -> str:
+    """Return a text whose further lines are items of an inner list."""
+    first, *items = text.split("\n")
+    return "\n".join([first, *(f"    * {item}" for item in items)])
+
+
 def page() -> str:
     """The page of claims, Markdown."""
     lines = [*HEAD, ""]
@@ -79,9 +85,9 @@ def page() -> str:
             "",
             f"`{claim.command}`" if " " not in claim.command else claim.command,
             "",
-            f"* **Means:** {claim.means}.",
-            f"* **Computed by:** {claim.computation}.",
-            f"* **Assumes:** {claim.assumes}.",
+            f"* **Means:** {indent_lines(claim.means)}.",
+            f"* **Computed by:** {indent_lines(claim.computation)}.",
+            f"* **Assumes:** {indent_lines(claim.assumes)}.",
             f"* **Test:** `{claim.test}`.",
             "",
         ]
