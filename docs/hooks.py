@@ -19,6 +19,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parent))
 import lessons
 import pictures
+from tables import commands, errors
 
 ROOT = lessons.ROOT
 PACKAGE = ROOT / "src" / "hrsynth"
@@ -224,8 +225,6 @@ def records() -> str:
 
 def build_reference() -> Iterator[tuple[str, str]]:
     """Yield name and content of the pages of commands and of errors."""
-    from tables import commands, errors
-
     yield "commands.md", commands.build_page()
     yield "errors.md", errors.build_page()
 
