@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Sequence
+from typing import TypeVar
 
 from hrsynth import errors
 from hrsynth.errors import HrsynthError
 
 from .markdown import table
+
+Kind = TypeVar("Kind", bound=Exception)
 
 INTRODUCTION = """\
 # Errors and exit status
@@ -60,12 +64,12 @@ def build_page() -> str:
     return "\n".join(parts)
 
 
-def write_table(kinds: list[type]) -> str:
+def write_table(kinds: Sequence[type[Exception]]) -> str:
     """Return the Markdown table of classes, each with the first sentence of its docstring."""
     return table(("class", "meaning"), ((f"`{kind.__name__}`", first_sentence(kind)) for kind in kinds))
 
 
-def list_classes(base: type) -> list[type]:
+def list_classes(base: type[Kind]) -> list[type[Kind]]:
     """Return the classes of ``hrsynth.errors`` below a base, in the order of the file."""
     return [
         kind
