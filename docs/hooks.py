@@ -19,6 +19,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parent))
 import lessons
 import pictures
+from tables import commands, errors
 
 ROOT = lessons.ROOT
 PACKAGE = ROOT / "src" / "hrsynth"
@@ -78,6 +79,7 @@ def made() -> Iterator[tuple[str, str | bytes]]:
     for script in lessons.scripts():
         yield from lesson(script)
     yield "json.md", records()
+    yield from build_reference()
     yield "reference/index.md", public()
     for folder in FOLDERS:
         if (PACKAGE / folder).is_dir():
@@ -219,6 +221,12 @@ def records() -> str:
     from hrsynth.cli.schema import page
 
     return page()
+
+
+def build_reference() -> Iterator[tuple[str, str]]:
+    """Yield name and content of the pages of commands and of errors."""
+    yield "commands.md", commands.build_page()
+    yield "errors.md", errors.build_page()
 
 
 def modules(folder: str) -> str:

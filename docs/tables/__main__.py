@@ -21,7 +21,8 @@ rewrite(
 rewrite(PAGES / "lint_rules.md", {lint_rules.START: lint_rules.table})
 rewrite(PAGES / "closures.md", {closures.START: closures.table, closures.WRITTEN_START: closures.written_table})
 rewrite(PAGES / "observations.md", {observation_kinds.START: observation_kinds.table})
-rewrite(PAGES / "catalog.md", {catalog.START: catalog.table})
+rewrite(PAGES / "find_an_architecture.md", {catalog.START: catalog.table})
 shown = architectures.PAGE.read_text(encoding="utf-8")
-architectures.PAGE.write_text(architectures.written(shown, load()), encoding="utf-8", newline="\n")
+architectures.PAGE.write_text(architectures.written(shown, load()), encoding="utf-8", newline="
+")
 (PAGES / "claims.md").write_text(claims.page(), encoding="utf-8", newline="\n")

@@ -1,4 +1,4 @@
-"""The table of the catalog, on the page docs/pages/catalog.md."""
+"""The table of the catalog, on the page docs/pages/find_an_architecture.md."""
 
 from __future__ import annotations
 

@@ -56,26 +56,39 @@ CLAIMS = tuple(Claim(**row) for row in _rows("claim"))
 NO_CLAIMS = tuple(NoClaim(**row) for row in _rows("no_claim"))
 
 
+HEAD = (
+    "# Claims: what each word of certainty means",
+    "",
+    "Each word of certainty that the program prints is in this list; what is not in it is not claimed. Each row names "
+    "the test that would fail if the claim were false.",
+    "",
+    "All rows assume that the file's numbers are the robot's geometry. *Ranks* stands for: numerical, no proof; the "
+    "configurations are generic, and a rank gap of at least 1000 decides the rank.",
+    "",
+    "The list is made from `docs/tables/claims.toml`. A test fails if a text with such a word is not listed there.",
+)
+"""The lines before the claims."""
+
+
+def indent_lines(text: str) -> str:
+    """Return a text whose further lines are items of an inner list."""
+    first, *items = text.split("\n")
+    return "\n".join([first, *(f"    * {item}" for item in items)])
+
+
 def page() -> str:
     """The page of claims, Markdown."""
-    lines = [
-        "# What each word of certainty stands for",
-        "",
-        "Each word of certainty that the program prints stands in this table, which is made from the project's own "
-        "(`docs/tables/claims.toml`). A test fails if a text holds such a word and is not listed there. What is "
-        "not in this table is not claimed.",
-        "",
-    ]
+    lines = [*HEAD, ""]
     for claim in CLAIMS:
         lines += [
             f"## {claim.phrase}",
             "",
             f"`{claim.command}`" if " " not in claim.command else claim.command,
             "",
-            f"* **Stands for:** {claim.means}.",
-            f"* **Computed by:** {claim.computation}.",
-            f"* **Assumes:** {claim.assumes}.",
-            f"* **Would fail:** `{claim.test}`.",
+            f"* **Means:** {indent_lines(claim.means)}.",
+            f"* **Computed by:** {indent_lines(claim.computation)}.",
+            f"* **Assumes:** {indent_lines(claim.assumes)}.",
+            f"* **Test:** `{claim.test}`.",
             "",
         ]
     return "\n".join(lines)

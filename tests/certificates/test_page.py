@@ -17,7 +17,7 @@ import pytest
 import hrsynth
 from hrsynth.certificates.verify_certificate import KINDS
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "pages" / "certificates.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "pages" / "certificate_files.md"
 CAMERA = {
     "camera": "eye=base@0.3,0.1,0",
     "see": ["point:platform@0.1,0,0", "point:platform@-0.1,0.1,0", "point:platform@0,0.1,0.1"],
@@ -209,8 +209,8 @@ def keys(each: Any) -> Iterator[str]:
 
 def test_the_page_names_all_that_is_in_a_file():
     page = PAGE.read_text(encoding="utf-8")
-    told = page[page.index("### What is in the file") : page.index("## What a certificate of a path proves")]
-    words = {word for code in re.findall(r"`([^`]*)`", told.replace("\n", " ")) for word in re.findall(r"\w+", code)}
+    section = page[page.index("## What is in the file") :]
+    words = {word for code in re.findall(r"`([^`]*)`", section.replace("\n", " ")) for word in re.findall(r"\w+", code)}
     needed = {key for name in ("3rrr_m1", "quattro", "3rps") for key in keys(record(name))}
     needed |= {key for _, names in KINDS.values() for key in names.split()} | {"misses", "far"}
     needed |= set(keys(json.loads(json.dumps(hrsynth.certificate(hrsynth.derive("rrrrr_m1")))))) - {"A", "X", "Y"}

@@ -1,4 +1,4 @@
-"""The dialect that docs/pages/adding.md adds, in the words of the page: found by itself, read, written, refused."""
+"""The file format that docs/pages/adding.md adds, in the words of the page: found by itself, read, written, refused."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "pages" / "adding.md"
 @pytest.fixture
 def sample(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """The page's robot file, its dialect in place."""
-    section = PAGE.read_text(encoding="utf-8").split("## A dialect")[1].split("\n## ")[0]
+    section = PAGE.read_text(encoding="utf-8").split("## A format")[1].split("\n## ")[0]
     text, *modules = re.findall(r"```(?:xml|python)\n(.*?)```", section, re.DOTALL)
     folder = tmp_path / "formats" / "bars"
     folder.mkdir(parents=True)
@@ -49,7 +49,7 @@ def test_the_dialect_of_the_page_is_read_and_written(sample: Path):
 
 def test_its_defects_have_their_lines(sample: Path):
     sample.write_text(sample.read_text().replace('one="base" two="rocker"', 'one="bose" two="rocker"'))
-    with pytest.raises(BadRobotFile, match=r"four_bar.bars:4: hinge: unknown bar, found bose"):
+    with pytest.raises(BadRobotFile, match=r"four_bar.bars:4: revolute: unknown bar, found bose"):
         load(sample)
 
 
