@@ -102,7 +102,7 @@ def test_any_function_is_asked_and_any_question():
     ],
 )
 def test_what_cannot_be_asked_is_refused_before_the_work(question, robots, options, expected):
-    with pytest.raises(BadRequest, match=allowed):
+    with pytest.raises(BadRequest, match=expected):
         hrsynth.map_robots(question, robots, **options)
 
 

@@ -21,7 +21,12 @@ ROOT = Path(__file__).resolve().parent.parent
 PAGES = ROOT / "docs" / "pages"
 README, ROBOTS, PAPERS, CATALOG = (
     file.read_text(encoding="utf-8")
-    for file in (ROOT / "README.md", ROOT / "robots" / "README.md", PAGES / "papers.md", PAGES / "find_an_architecture.md")
+    for file in (
+        ROOT / "README.md",
+        ROOT / "robots" / "README.md",
+        PAGES / "papers.md",
+        PAGES / "find_an_architecture.md",
+    )
 )
 LONGEST = 8_000
 """Bytes of the README at most."""

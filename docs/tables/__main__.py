@@ -23,6 +23,5 @@ rewrite(PAGES / "closures.md", {closures.START: closures.table, closures.WRITTEN
 rewrite(PAGES / "observations.md", {observation_kinds.START: observation_kinds.table})
 rewrite(PAGES / "find_an_architecture.md", {catalog.START: catalog.table})
 shown = architectures.PAGE.read_text(encoding="utf-8")
-architectures.PAGE.write_text(architectures.written(shown, load()), encoding="utf-8", newline="
-")
+architectures.PAGE.write_text(architectures.written(shown, load()), encoding="utf-8", newline="\n")
 (PAGES / "claims.md").write_text(claims.page(), encoding="utf-8", newline="\n")
