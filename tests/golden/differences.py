@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
@@ -105,3 +106,24 @@ def of_pictures(old: list[list[int]], new: list[list[int]]) -> float:
     """The mean difference of the pixels of two pictures."""
     pairs = [(a, b) for one, two in zip(old, new, strict=True) for a, b in zip(one, two, strict=True)]
     return sum(abs(a - b) for a, b in pairs) / len(pairs)
+
+
+def values_of(value: Json) -> list[float]:
+    """Return the numbers of JSON, truth values and nulls as numbers too, in ascending order; without those of texts."""
+    if isinstance(value, dict):
+        return sorted(number for key, each in value.items() if key not in MOVING for number in values_of(each))
+    if isinstance(value, list):
+        return sorted(number for each in value for number in values_of(each))
+    return [] if isinstance(value, str) else [-HUGE if value is None else max(-HUGE, min(HUGE, float(value)))]
+
+
+def numbers_differ(old: Json, new: Json) -> Iterator[str]:
+    """Yield how two answers differ in the numbers of their JSON, and in those that their texts show."""
+    before, after = values_of(old.get("json", old)), values_of(new.get("json", new))
+    if len(before) != len(after):
+        yield f"{len(before)} values are now {len(after)}"
+    elif apart := [(a, b) for a, b in zip(before, after, strict=True) if abs(a - b) > ABSOLUTE + RELATIVE * abs(a)]:
+        yield f"values differ: {apart[:3]}"
+    shown = [Counter(NUMBER.findall(str(each.get("text", "")))) for each in (old, new)]
+    if shown[0] != shown[1]:
+        yield f"numbers in text: gone {dict(shown[0] - shown[1])}, new {dict(shown[1] - shown[0])}"[:300]

@@ -2,7 +2,8 @@
 
 From ``tests/``. ``--only TEXT``: cases whose names hold it; ``--workers N``. What was changed on purpose (names of JSON
 fields, words, what was added) stands in ``renamed.toml``. The exit status of ``compare`` is 1 where anything differs.
-Files of others are asked where they are; cases that only one side has are told.
+Files of others are read where they are; cases that only one side has are listed. ``--numbers`` compares numbers, truth
+values and their count alone, in JSON and in text, whatever the words and the names of fields are.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import argparse
 import gzip
 import json
 import multiprocessing
+import re
 import sys
 import tomllib
 from collections.abc import Iterable, Iterator
@@ -18,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from golden.answers import Case, asked, cases
-from golden.differences import GREY, differences, inlined, of_pictures, renamed, without
+from golden.differences import GREY, differences, inlined, numbers_differ, of_pictures, renamed, without
 
 KEPT = Path(__file__).parent / "answers.jsonl.gz"
 NAMES = Path(__file__).parent / "renamed.toml"
@@ -56,6 +58,7 @@ def main() -> int:
     parser.add_argument("what", choices=("make", "compare"))
     parser.add_argument("--only", default="")
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--numbers", action="store_true")
     given = parser.parse_args()
     chosen = [case for case in cases() if given.only in case.key]
     known: dict[str, Any] = {}
@@ -69,10 +72,17 @@ def main() -> int:
         print(f"{len(known)} answers, {KEPT.stat().st_size / 1e3:.0f} kB")
         return 0
     meant = tomllib.loads(NAMES.read_text())
+    for old, now in meant["commands"].items():
+        known = {re.sub(rf": {old}(?= |$)", f": {now}", key): value for key, value in known.items()}
     new = [case.key for case in chosen if case.key not in known]
     differ = 0
     for key, found in answers((case for case in chosen if case.key in known), given.workers):
-        if told := changes(known[key], json.loads(json.dumps(found)), meant):
+        now = json.loads(json.dumps(found))
+        if (
+            told := list(numbers_differ(known[key], without(now, *meant["added"].values())))
+            if given.numbers
+            else changes(known[key], now, meant)
+        ):
             differ += 1
             print(f"{key}\n  " + "\n  ".join(told[:5]) + (f"\n  … {len(told) - 5} more" if len(told) > 5 else ""))
     print(f"{len(chosen) - len(new)} answers compared, {differ} differ; {len(new)} new")
