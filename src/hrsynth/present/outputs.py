@@ -303,7 +303,7 @@ OUTPUTS = {
         ),
     ),
     "equilibria": Outputs(
-        "text.endings:endings",
+        "text.equilibria:equilibria",
         (
             File(
                 "cannot draw the endings",

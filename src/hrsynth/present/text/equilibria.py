@@ -18,7 +18,7 @@ LISTED_SADDLES = 12
 """Rests that do not attract which are told one by one."""
 
 
-def endings(found: Equilibria) -> str:
+def equilibria(found: Equilibria) -> str:
     """The goal, the rests that attract, some of those that do not, and whether that is all."""
     drawn = [each for each in found.points if each.stability in ("stable", "undecided")]
     others = [each for each in found.points if each.stability not in ("stable", "undecided")]
