@@ -7,8 +7,10 @@ in a folder of the package. Pages, README and help break none.
 from __future__ import annotations
 
 import ast
+import inspect
 import io
 import re
+import subprocess
 import sys
 import tokenize
 import tomllib
@@ -18,6 +20,8 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+
+import hrsynth
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, PAGES = ROOT / "src" / "hrsynth", ROOT / "docs" / "pages"
@@ -49,6 +53,8 @@ HOW_TO = [
     "use",
 ]
 PARAGRAPH, SENTENCE, TASK = 90, 25, 600
+SINCE = "2026-11-29T16:00:00Z"
+"""Commits from then on keep the rule."""
 
 Breach = tuple[str, str, int, str]
 """Rule, folder, line, what breaks it, with its file."""
@@ -180,6 +186,30 @@ def test_a_how_to_page_is_one_task_of_at_most_600_words(path: Path):
     text = re.sub(r"^```.*?^```", "", path.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
     text = re.sub(r"<!-- generated.*?<!-- end -->", "", text, flags=re.DOTALL)
     assert len(text.split()) <= TASK
+
+
+PUBLIC = [name for name in hrsynth.__all__ if callable(getattr(hrsynth, name)) and not name.startswith("_")]
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_a_public_function_documents_what_it_takes_and_returns(name: str):
+    function = getattr(hrsynth, name)
+    doc = inspect.getdoc(function) or ""
+    parts = dict(re.findall(r"^(\w+)\n-{3,}\n(.*?)(?=^\w+\n-{3,}\n|\Z)", doc, re.MULTILINE | re.DOTALL))
+    documented = set(re.findall(r"\w+", " ".join(re.findall(r"^\S.*$", parts.get("Parameters", ""), re.MULTILINE))))
+    taken = {each for each in inspect.signature(function).parameters if each != "options"}
+    assert taken - documented == set()
+    assert "Returns" in parts or "Yields" in parts or inspect.signature(function).return_annotation in (None, "None")
+    assert not CLAUSE.match(doc)
+
+
+def test_subjects_of_commits_name_an_area_and_what_is_done():
+    log = ["git", "log", "--no-merges", "--since", SINCE, "--format=%s"]
+    done = subprocess.run(log, cwd=ROOT, capture_output=True, text=True, check=False)
+    if done.returncode:
+        pytest.skip("no history here")
+    subjects = done.stdout.splitlines()
+    assert [each for each in subjects if len(each) > 60 or not re.match(r"[a-z_.]+: [a-z]", each)] == []
 
 
 def lower() -> None:
