@@ -38,11 +38,15 @@ def certificate(found: AssemblyModes | Derivation | PathAnswer) -> dict[str, Any
         return ranks.certificate(found)
     if isinstance(found, PathAnswer):
         return paths.certificate(found)
-    raise BadRequest("what has a certificate", type(found).__name__, "what modes, derive or path answer")
+    raise BadRequest(
+        "a certificate is of a complete list of modes, a derivation or a path",
+        type(found).__name__,
+        "what modes, derive or path answer",
+    )
 
 
 def write_certificate(found: AssemblyModes | Derivation | PathAnswer) -> bytes:
-    """A certificate as the content of a file."""
+    """Return a certificate as the content of a file."""
     return (json.dumps(certificate(found), indent=1) + "\n").encode()
 
 
@@ -68,15 +72,15 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
         except NotAccepted as reason:
             raise CertificateRefused(name, str(reason)) from None
         except (OSError, ValueError, RecursionError) as error:
-            why = getattr(error, "strerror", None) or "it is not JSON"
+            why = getattr(error, "not JSON", None) or "it is not JSON"
             raise BadRequest(
-                f"the certificate cannot be read: {why}",
+                f"{file}: the certificate is not readable: {why}",
                 name,
                 "a file that modes, derive or path wrote with --certificate",
             ) from None
     try:
         if not isinstance(record, dict):
-            raise NotAccepted("it is not an object")
+            raise NotAccepted("it is not a JSON object")
         checkers = {"path": verify_path, "ranks": verify_ranks}
         checker = checkers.get(str(record.get("claim")), verify_certificate)
         proved = checker.verify(record) if file is None else _within_limits(Path(str(checker.__file__)), file)
@@ -89,14 +93,14 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
         except (BadRequest, NoCertificate, PoseNotReached) as error:
             raise CertificateRefused(name, f"it is not for {robot.name}: {error}") from None
         except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
-            raise CertificateRefused(name, f"it does not say which legs and pose it is for ({error!r})") from None
+            raise CertificateRefused(name, f"it does not name the legs and pose of its claim ({error!r})") from None
         if not _same(record, own):
             raise CertificateRefused(name, f"it is not for {robot.name}: other geometry, legs or pose")
     return f"{proved}{ranks.describe_ranks(record)}" if record["claim"] == "ranks" else proved
 
 
 def _within_limits(checker: Path, file: Path) -> str:
-    """What the checker says of a file, in a process of its own; raises ``NotAccepted``, ``BadRequest``."""
+    """Run the checker on a file, in a process of its own; raises ``NotAccepted``, ``BadRequest``."""
     verdict, _, said = output(checker, str(file), seconds=VERIFY_SECONDS).decode().strip().partition(": ")
     if verdict != "accepted":
         raise NotAccepted(said)
@@ -104,7 +108,7 @@ def _within_limits(checker: Path, file: Path) -> str:
 
 
 def _same(one: Any, other: Any) -> bool:
-    """Whether two records of geometry are alike; what was solved for is left out."""
+    """Return True if two records of geometry agree; solutions are left out."""
     if isinstance(one, dict) and isinstance(other, dict):
         left_out = {"robot", "boxes", "bound", "sha256", "stacks", "path"}
         return one.keys() - left_out == other.keys() - left_out and all(

@@ -28,7 +28,7 @@ PRIME, FIT, WITHIN, FAR, TERMS, LENGTH = 2147483647, Fraction(1, 10**9), Fractio
 
 
 class NotAccepted(Exception):
-    """Why a certificate is not accepted."""
+    """Certificate that is not accepted: the reason."""
 
 
 def need(true, why):

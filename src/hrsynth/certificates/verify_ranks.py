@@ -12,7 +12,7 @@ PRIME, LENGTH, MOST = 2147483647, 5_000_000, 300  # of a file; of rows and colum
 
 
 class RanksNotAccepted(Exception):
-    """Why a certificate is not accepted."""
+    """Certificate that is not accepted: the reason."""
 
 
 def need(true, why):

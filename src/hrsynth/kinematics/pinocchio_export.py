@@ -1,4 +1,4 @@
-"""A mechanism for Pinocchio alone: the file's tree in metres, its loops as Pinocchio's own constraints.
+"""Export of a mechanism to Pinocchio alone: the file's tree in metres, its loops as Pinocchio's own constraints.
 
 The frame of a joint lies at its centre, turned as the link that it carries. :mod:`.pinocchio_model`, with which this
 project computes, has a tree, a zero and a unit of length of its own.
@@ -114,11 +114,12 @@ class _Export:
         )
 
     def _carried(self, link: str) -> list[Joint]:
-        """The joints to be added on a link, the last one first: those of the tree and those that end in a leaf."""
+        """Return the joints to be added on a link, the last one first: those of the tree and those that end in a
+        leaf."""
         return [each for each in self._robot.joints_of(link)[::-1] if each.predecessor == link and not _is_ball(each)]
 
     def _order(self, joint: Joint) -> int:
-        """-1 where a U is passed against its direction, from its second axis to its first."""
+        """Return -1 if a U is passed against its direction, from its second axis to its first."""
         given = self._given.joints.get(joint.name, joint)
         return -1 if joint.type is JointType.UNIVERSAL and given.predecessor != joint.predecessor else 1
 
@@ -169,12 +170,12 @@ class _Export:
         return body, frame
 
     def _start(self, joint: str, place: int = 0) -> tuple[int, int]:
-        """Where the coordinates of a part of a joint start in q and in v."""
+        """Return the start indices in q and in v of a part of a joint."""
         own = self._model.joints[self._model.getJointId(self._joints[joint][place])]
         return own.idx_q, own.idx_v
 
     def _bound(self) -> None:
-        """The limits that the file has; those of a U, C or E, one for all its axes, count from the file's zero."""
+        """Set the limits that the file has; those of a U, C or E, one for all its axes, count from the file's zero."""
         model = self._model
         for name, joint in self._robot.joints.items():
             for place in range(0 if joint.type in _WHOLE else len(self._joints.get(name, ()))):
@@ -195,7 +196,7 @@ class _Export:
                         bounds[index] = start + sign * value
 
     def _gears(self) -> Array:
-        """One row a coupling: the driven joint's rate − ratio × the driving one's."""
+        """Return one row a coupling: the driven joint's rate − ratio × the driving one's."""
         rows = np.zeros((len(self._robot.couplings), self._model.nv))
         for row, coupling in zip(rows, self._robot.couplings, strict=True):
             for link, factor in ((coupling.successor, 1.0), (coupling.predecessor, -coupling.ratio)):
@@ -204,7 +205,7 @@ class _Export:
 
 
 def _is_ball(joint: Joint) -> bool:
-    """Whether a loop holds two points together, and no motor turns it."""
+    """Return True if a loop joins two points, and no motor rotates it."""
     return joint.type is JointType.SPHERICAL and not joint.in_tree and not joint.actuated
 
 

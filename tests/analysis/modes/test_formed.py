@@ -110,7 +110,7 @@ def test_a_flexible_formation_has_a_continuum_with_its_flexes(places: Array, bea
     assert (found.found.continuous_family, found.found.complete, found.modes) == (flexes, False, ())
     assert found.formation is not None
     assert sum(each.count for each in found.formation.flexes) == flexes
-    assert f"a continuum of dimension {flexes}" in text(found)
+    assert f"a continuous family of dimension {flexes}" in text(found)
 
 
 KNOWN = [

@@ -213,4 +213,4 @@ def test_freedoms_that_are_never_seen_are_moved(name: str, observe: str | None):
     (motion,) = found.self_motions
     assert motion.dimension == found.found.continuous_family
     assert motion.goal
-    assert "a continuum" in found.count
+    assert "a continuous family" in found.count

@@ -506,7 +506,7 @@ def path(
     seed: Seed = 0,
     budget: int = BUDGET,
 ) -> PathAnswer:
-    """Find a path without Type 2 singularity between two poses, or prove that there is none.
+    """Find a path without Type 2 singularity between two poses, with a proof: same aspect, separated or undecided.
 
     Parameters
     ----------

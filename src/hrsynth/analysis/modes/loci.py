@@ -1,4 +1,4 @@
-"""What the tip of an observed leg can reach while its direction is held: a point, a curve or a surface.
+"""Loci of the tip of an observed leg with a fixed direction: point, curve or surface.
 
 Lengths in metres, angles in radians, all coordinates in one frame that the caller chooses (the base frame).
 """
@@ -33,7 +33,7 @@ class _Checked(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Point(_Checked):
-    """The tip rests at ``centre``, shape (3,)."""
+    """The tip is fixed at ``centre``, shape (3,)."""
 
     centre: Array
     freedoms = 0
@@ -43,7 +43,7 @@ class Point(_Checked):
         return self.centre
 
     def miss(self, tip: Array) -> Array:
-        """What separates ``tip`` from the curve; shape (3,), metres."""
+        """Return the difference of ``tip`` and the curve; shape (3,), metres."""
         return tip - self.centre
 
 
@@ -162,7 +162,7 @@ class SweptCircle(_Checked):
     freedoms = 2
 
     def off(self, centre: Array) -> Array:
-        """How far the centre is from that of another; on a cylinder that slides."""
+        """Return the distance of the centre from that of another; on a cylinder that slides."""
         v = self.centre - centre
         return v if self.other else v - self.direction * float(self.axis @ v) / float(self.axis @ self.direction)
 
@@ -170,7 +170,7 @@ class SweptCircle(_Checked):
 Curve = Point | Line | Circle
 Surface = Sphere | Plane
 Reach = Curve | Surface
-"""What a tip can reach."""
+"""Locus of a tip."""
 Quadrics = Revolution | SweptCircle
 """Surfaces that only conditions on the pose know."""
 
@@ -185,7 +185,7 @@ def shift_reach(reach: Curve, by: ArrayLike) -> Curve: ...
 @overload
 def shift_reach(reach: Reach, by: ArrayLike) -> Reach: ...
 def shift_reach(reach: Reach, by: ArrayLike) -> Reach:
-    """The same moved by ``by`` (3,), with the same parameter at each point of a curve."""
+    """Return the locus moved by ``by`` (3,), with the same parameter at each point of a curve."""
     return replace(reach, centre=reach.centre + np.asarray(by, dtype=float))
 
 

@@ -1,4 +1,4 @@
-"""The ways to list modes: by tips, by conditions on the pose, by loops, by a leg that carries the platform."""
+"""Methods that list modes: by tips, by conditions on the pose, by loops, by a leg that carries the platform."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def without_couplings(
 
 def better_ways(made: Model) -> tuple[Any, ...]:
     """Ways that may count complex modes too where a list is that of a part of the conditions on the pose, as the sense
-    of an axis is told besides."""
+    of an axis is known besides."""
     system = made.system
     senses = sum(isinstance(c, AtAngle) and c.h == 1.0 for c in getattr(system, "conditions", ()))
     if not isinstance(system, PosedPlatform) or not senses:
@@ -99,8 +99,8 @@ def solve_tips(
 
 
 def expected_modes(measured: MeasuredRobot, at: ClosedConfiguration) -> int:
-    """How many modes, complex ones too, the degrees of the legs' conditions allow; the largest number where these are
-    not known."""
+    """Return a root bound of the modes, complex ones too, from the degrees of the legs' conditions; the largest number
+    if these are not known."""
     try:
         return most_posed(measured, at)
     except (UnsupportedLocus, SystemNotSolved):
@@ -108,8 +108,8 @@ def expected_modes(measured: MeasuredRobot, at: ClosedConfiguration) -> int:
 
 
 def count_modes(measured: MeasuredRobot, at: ClosedConfiguration) -> SystemModes:
-    """The modes with the measurements at a configuration, without near ones, and not read as poses of the robot's legs:
-    as :func:`modes`, for many configurations of one robot that sees all its freedoms."""
+    """List the modes with the measured values at a configuration, without near ones, and not read as poses of the
+    robot's legs: as :func:`modes`, for many configurations of one robot that observes all its dof."""
     found = None
     if measured.generic_pattern.motion != "oriented":
         with suppress(UnsupportedLocus, SystemNotSolved, TooLarge, MissingExtra):

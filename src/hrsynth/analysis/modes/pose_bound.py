@@ -1,4 +1,4 @@
-"""At most how many poses meet conditions: ranks modulo a prime (docs/pages/proofs.md, section 8).
+"""Root bound of poses that meet conditions: ranks modulo a prime (docs/pages/proofs.md, section 8).
 
 I_t are the multiples of the conditions among the forms of degree t, and w = q · q. If wᵏ S_{t-2k} lies in
 wᵏ⁺¹ S_{t-2k-2} + I_t, S the forms, then each function of the pose is, modulo the conditions, one of the degree

@@ -14,7 +14,7 @@ from .polynomials import Equation
 from .quadrics import UNIT, Conic, Numbers, Rounded, WorkingFrame, conic, direction, on_plane, on_sphere, spatial_frame
 
 TURNS = (0.7, 1.9, 2.6)
-"""Where t = 0 lies on the circles of the first, second and third unknown (rad): nowhere special."""
+"""Origin t = 0 on the circles of the first, second and third unknown (rad): nowhere special."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,12 +44,12 @@ class SquareSystem:
         return [] if self.frame is None else self.build(self.conics(turn, numbers), numbers)
 
     def turns(self, turn: float) -> list[float]:
-        """Where each unknown's circle is counted from (rad)."""
+        """Origins of the circles of each unknown (rad)."""
         return [each + turn for each in TURNS[: len(self.unknowns)]]
 
     @property
     def round(self) -> list[bool]:
-        """Which unknowns are half-angle tangents."""
+        """Unknowns that are half-angle tangents."""
         return [isinstance(curve, Circle) for curve in self.unknowns]
 
 
@@ -60,7 +60,7 @@ def single(quadratic: Any) -> Equation:
 
 
 def resting(legs: tuple[int, ...], q: Array, whole: bool) -> SquareSystem:
-    """A pose that a tip at rest decides: nothing to solve."""
+    """A pose that a fixed tip determines: nothing to solve."""
     return SquareSystem(legs, (), None, lambda conics, numbers: [], lambda parameters: q, whole)
 
 
