@@ -25,10 +25,29 @@ from .verify_ranks import RanksNotAccepted
 
 
 def certificate(found: AssemblyModes | Derivation | PathAnswer) -> dict[str, Any]:
-    """The certificate of a complete list of modes, of a derivation's verdict in exact arithmetic, or of a path: plain
-    data that ``verify`` checks, or one of the files ``verify_certificate.py``, ``verify_ranks.py`` and
-    ``verify_path.py``. Raises ``NoCertificate``.
+    """Return the certificate of a result, as data that a checker accepts without this package.
 
+    Parameters
+    ----------
+    found
+        Result of ``modes`` with a complete list, of ``derive`` with a verdict in exact arithmetic, or of ``path`` with
+        a certified verdict.
+
+    Returns
+    -------
+    dict
+        Content of a JSON file for ``verify``, or for one of ``verify_certificate.py``, ``verify_ranks.py`` and
+        ``verify_path.py``. Lengths are in characteristic lengths, numbers are fractions as text.
+
+    Raises
+    ------
+    NoCertificate
+        If the result has no proof that the checkers accept.
+    BadRequest
+        If the result is of another kind.
+
+    Examples
+    --------
     >>> hrsynth.certificate(hrsynth.modes("3rrr_m1"))["complex"]
     6
     """
@@ -39,9 +58,7 @@ def certificate(found: AssemblyModes | Derivation | PathAnswer) -> dict[str, Any
     if isinstance(found, PathAnswer):
         return paths.certificate(found)
     raise BadRequest(
-        "a certificate is of a complete list of modes, a derivation or a path",
-        type(found).__name__,
-        "what modes, derive or path answer",
+        f"{type(found).__name__}: a result without certificates", remedy="Use a result of modes, derive or path."
     )
 
 
@@ -51,11 +68,29 @@ def write_certificate(found: AssemblyModes | Derivation | PathAnswer) -> bytes:
 
 
 def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path | None = None) -> str:
-    """What a certificate, or a certificate file, proves, in words, by the checker's own computation; with ``robot`` it
-    is also checked that its geometry is that robot's, to ``SAME_RELATION`` of its size.
+    """Verify a certificate by the checker's own computation, and return what it proves.
 
-    Raises ``CertificateRefused`` if it does not hold, ``BadRequest`` for a file that cannot be read.
+    Parameters
+    ----------
+    source
+        Certificate, or path of its file.
+    robot
+        Robot whose geometry must be that of the certificate, to ``SAME_RELATION`` characteristic lengths.
 
+    Returns
+    -------
+    str
+        Claim that is proved.
+
+    Raises
+    ------
+    CertificateRefused
+        If the certificate is not accepted.
+    BadRequest
+        If the file is not readable.
+
+    Examples
+    --------
     >>> hrsynth.verify(hrsynth.certificate(hrsynth.modes("3rrr_m1")))
     '2 real of 6 complex poses, and no other; the robot closes at 2 of the real ones, to 1e-9'
     """
@@ -67,16 +102,18 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
             with open_regular(file) as content:
                 text = content.read(verify_certificate.LENGTH + 1).decode()
             if len(text) > verify_certificate.LENGTH:
-                raise BadRequest("the certificate is too long", name, f"up to {verify_certificate.LENGTH} characters")
+                raise BadRequest(
+                    f"{name}: the certificate is longer than {verify_certificate.LENGTH} characters",
+                    remedy="Use a file that --certificate wrote.",
+                )
             record = json.loads(text, object_pairs_hook=once)
         except NotAccepted as reason:
             raise CertificateRefused(name, str(reason)) from None
         except (OSError, ValueError, RecursionError) as error:
             why = getattr(error, "not JSON", None) or "it is not JSON"
             raise BadRequest(
-                f"{file}: the certificate is not readable: {why}",
-                name,
-                "a file that modes, derive or path wrote with --certificate",
+                f"{name}: the certificate cannot be read: {why}",
+                remedy="Use a file that modes, derive or path wrote with --certificate.",
             ) from None
     try:
         if not isinstance(record, dict):

@@ -146,7 +146,7 @@ def _wanted(home: ClosedConfiguration, asked: JointPose) -> dict[str, tuple[floa
     if asked.motors:
         robot.require_motors()
     if not joints:
-        raise BadRequest(f"{robot.name} has no joint with coordinates", str(asked), "another pose")
+        raise BadRequest(f"{asked}: {robot.name} has no joint with coordinates", remedy="Use a pose of the platform.")
     given, degrees = dict(asked.values), {*asked.degrees}
     if "" in given:
         flat = [x for _, part in asked.values for x in part]
@@ -163,14 +163,14 @@ def _wanted(home: ClosedConfiguration, asked: JointPose) -> dict[str, tuple[floa
             raise BadRequest(
                 f"{robot.name}: coordinates of {name}",
                 "/".join(map(str, values)),
-                "one number" if sizes[name] == 1 else "two numbers with / between",
+                "one number" if sizes[name] == 1 else "two numbers, as 0.1/0.2",
             )
         if name in degrees and joints[name].type.slides:
-            raise BadRequest(f"{robot.name}: {name} slides", "degrees", "metres")
+            raise BadRequest(f"{robot.name}: unit of prismatic joint {name}", "degrees", "metres")
         low, high = robot.filed.get(name, (-np.inf, np.inf))
         if not low - SAME_POINT <= min(values) <= max(values) <= high + SAME_POINT:
             told = "/".join(map(str, values))
-            raise BadRequest(f"{robot.name}: {name} beyond its limits", told, f"{low:.6g} to {high:.6g}")
+            raise BadRequest(f"{robot.name}: {name} is beyond its limits", told, f"{low:.6g} to {high:.6g}")
     stay = {name: values for name, values in read_joints(home).items() if asked.motors and name in joints}
     return {**stay, **given}
 
@@ -178,7 +178,7 @@ def _wanted(home: ClosedConfiguration, asked: JointPose) -> dict[str, tuple[floa
 def _lead(
     home: ClosedConfiguration, motion: PlatformMotion, wanted: Mapping[str, tuple[float, ...]], asked: JointPose
 ) -> ClosedConfiguration:
-    """Yield steps from the zero configuration to coordinates, as many of them at a time as are independent."""
+    """Follow steps from the zero configuration to coordinates, as many of them at a time as are independent."""
     from scipy.linalg import qr
 
     model, robot = home.model, home.model.mechanism
@@ -203,7 +203,7 @@ def _lead(
     def refuse(stopped: str) -> PoseNotReached:
         told = read_joints(here)
         last = ",".join(f"{joint}={'/'.join(f'{x:.6g}' for x in told[joint])}" for joint in wanted)
-        way = f"; from its zero configuration the robot gets {100 * came:.3g} % of the way" * (came < 1)
+        way = f"; the robot follows {100 * came:.3g} % of the path from its zero configuration" * (came < 1)
         return PoseNotReached(robot.name, str(asked), came, f"{asked.kind}:{last}", reason=stopped + way)
 
     goal = values[free]
@@ -221,13 +221,13 @@ def _lead(
     if missed.max() > AS_PRINTED:
         joint = names[int(np.argmax(missed))]
         told = "/".join(f"{x:.6g}" for x in read_joints(here)[joint])
-        raise refuse(f"with the others as they are {joint} is {told}")
+        raise refuse(f"with the other coordinates fixed {joint} is {told}")
     there = nearest(here, JointAim(places[free], goal, goal), rest)
     return here if past(there) else there
 
 
 Told = dict[str, float | tuple[float, ...]]
-"""Format coordinates by joint: a number, or one for each axis."""
+"""Coordinates by joint: a number, or one for each axis."""
 
 
 @dataclass(frozen=True, repr=False)

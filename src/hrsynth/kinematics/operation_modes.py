@@ -112,8 +112,7 @@ def _refuse_unmoved(found: Sequence[ClosedConfiguration]) -> None:
     raise BadMechanism(
         f"{mechanism.name}: neither the platform nor an observed segment moves, but other links do "
         f"({named}; mobility {found[0].kernel()[0].shape[1]})",
-        None,
-        "a platform or a watched segment that moves (--observe LINK)",
+        remedy="Observe a link that moves, with --observe LINK.",
     )
 
 

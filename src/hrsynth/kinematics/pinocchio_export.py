@@ -27,36 +27,55 @@ _WHOLE = {JointType.SPHERICAL: pin.JointModelSpherical, JointType.FREE: pin.Join
 
 
 class PinocchioExport(NamedTuple):
-    """What Pinocchio needs of a mechanism (metres, kilograms, radians)."""
+    """Pinocchio model of a mechanism with its constraint models (metres, kilograms, radians)."""
 
     model: pin.Model
-    """The tree, and a leaf for each loop that is cut through its joint; links are BODY frames. Bodies without a mass in
-    the file, leaves and the parts of U, C and E between two axes among them, have none: their forward dynamics need
+    """Tree, and a leaf for each loop that is cut through its joint; links are BODY frames. Bodies without a mass in
+    the file, such as leaves and the parts of U, C and E between two axes, have none: their forward dynamics need
     ``model.armature``."""
     constraint_models: list[pin.RigidConstraintModel]
-    """One a loop: ``CONTACT_3D`` holds the two points of a ball together, ``CONTACT_6D`` welds a leaf to its link."""
+    """One for each loop: ``CONTACT_3D`` for a spherical joint, ``CONTACT_6D`` welds a leaf to its link."""
     q0: Array
-    """The zero configuration of the mechanism, at which all loops are closed, as the file counts (nq,)."""
+    """Zero configuration of the mechanism, at which all loops are closed, relative to the file's zero (nq,)."""
     joints: dict[str, tuple[str, ...]]
-    """The joints of the file, each with the names of the model's joints that it is: S and floating joints are one,
-    fixed joints and balls that close a loop none, others one an axis."""
+    """Joints of the file with the names of their joints in the model: one for S and floating joints, none for fixed
+    joints and spherical loop closures, one for each axis of others."""
     motors: tuple[str, ...]
-    """Names of the model's joints that motors drive."""
+    """Names of the model's actuated joints."""
     closures: tuple[str, ...]
-    """Names of the file's joints that the constraint models are."""
+    """Names of the file's joints that the constraint models represent."""
     couplings: Array
-    """Gears, which no constraint model says, (gears, nv): ``couplings @ v = 0``, and
+    """Couplings, for which there is no constraint model, (couplings, nv): ``couplings @ v = 0``, and
     ``couplings @ pin.difference(model, q0, q) = 0``."""
 
 
 @with_spelling
 def to_pinocchio(robot: Mechanism | str | Path) -> PinocchioExport:
-    """The robot, with the loops that it closes, as what Pinocchio computes with: ``Mechanism.to_pinocchio()``.
+    """Export a robot with its loops to Pinocchio; also as ``Mechanism.to_pinocchio()``.
 
-    Coordinates count from the file's zero in the file's sense, joints and links have the file's names, and bounds,
-    masses and inertias are set where the file has them; a U is two revolute joints (``hip__1``, ``hip__2``), C and E
-    are such chains too. Gravity is 9.81 m/s² against the z axis of the base link: ``model.gravity`` sets another.
+    Parameters
+    ----------
+    robot
+        Mechanism, path of a file, or name of a shipped robot.
 
+    Returns
+    -------
+    PinocchioExport
+        Model, constraint models, zero configuration (nq,), names and couplings (metres, kilograms, radians).
+
+    Raises
+    ------
+    BadRobotFile, LoopsNotClosed
+        If the robot is not readable, or its loops do not close.
+
+    Notes
+    -----
+    Coordinates are relative to the file's zero, in the file's sense; joints and links have the file's names. Bounds,
+    masses and inertias are set if the file has them. A U is two revolute joints (``hip__1``, ``hip__2``), C and E are
+    such chains too. Gravity is 9.81 m/s² against the z axis of the base link; ``model.gravity`` sets another.
+
+    Examples
+    --------
     >>> model, constraints, q0, *names = hrsynth.to_pinocchio("3rrr_m1")
     >>> model.nq, len(constraints)
     (9, 2)

@@ -117,12 +117,18 @@ class PinocchioModel:
         if len(ordered) != len(mechanism.links) - 1:
             reached = {mechanism.base, *(child.other(parent) for child, parent in ordered)}
             missing = sorted(set(mechanism.links) - reached)
-            raise BadMechanism(f"{mechanism.name}: links that no joint connects to the base", ", ".join(missing))
+            raise BadMechanism(
+                f"{mechanism.name}: links that no joint connects to the base",
+                ", ".join(missing),
+                remedy="Connect each to another link.",
+            )
         used = {joint.name for joint, _ in ordered}
         driven = ", ".join(name for name in mechanism.idle if mechanism.joints[name].actuated)
         if driven:
             raise BadMechanism(
-                f"{mechanism.name}: a motor on a floating joint whose link other joints hold", driven, "motors on those"
+                f"{mechanism.name}: a motor on a floating joint whose link other joints hold",
+                driven,
+                remedy="Put the motors on these joints.",
             )
         return ordered, [joint for joint in joints if joint.name not in used]
 

@@ -207,17 +207,17 @@ class PlatformMotion(Value):
         constant = [name for name in pose.given if name not in self.parts]
         for name in constant:
             if not self._as_at_home(pose, name):
-                raise BadRequest(f"{robot}: the platform cannot change {name}", str(pose), self.parts or "no part")
+                raise BadRequest(f"{robot}: the platform cannot change {name}", str(pose), self.parts)
         pose = pose.without(constant)
         normal, phi, rotation = self.normal, pose.phi, pose.rotation
         if rotation is not None and self.rotations.shape[1] == 1:
             turn, normal = rotation @ self.home[:3, :3].T, self.rotations[:, 0]
             phi, rotation = turn_about(normal, turn)[0], None
             if np.linalg.norm(turn @ normal - normal) > AS_PRINTED:
+                axis = " ".join(f"{x:.4g}" for x in self.rotations[:, 0])
                 raise BadRequest(
-                    f"{robot}: the platform turns about one axis only, rpy is not such a turn",
-                    str(pose),
-                    "phi, or a turn about " + " ".join(f"{x:.4g}" for x in self.rotations[:, 0]),
+                    f"{pose}: the platform of {robot} rotates about one axis only",
+                    remedy=f"Use phi, or a rotation about {axis}.",
                 )
         placed = [i for i, name in enumerate("xyz") if name in pose.given]
         values = np.array([getattr(pose, "xyz"[i]) for i in placed], dtype=float)

@@ -116,7 +116,7 @@ def sample(
     start = ClosedConfiguration.of(model, model.q0)
     moves = relation(start, observation_model).dimension > 0
     if not moves and not start.kernel()[0].shape[1]:
-        raise BadMechanism(f"{model.mechanism.name}: its loops let no link move", None, "a mechanism that can move")
+        raise BadMechanism(f"{model.mechanism.name}: its loops let no link move", remedy="Check its loop closures.")
     rng = np.random.default_rng(seed)
     regular = is_regular(start, rng)
     roots = [start] if regular and moves else ways_out(start, observation_model, rng, singular=not regular)

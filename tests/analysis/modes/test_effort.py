@@ -17,7 +17,7 @@ def test_fewer_branches_are_solved_with_less_effort_and_that_is_told():
     assert whole.found.complete
     assert not few.found.complete
     assert few.found.bound == "none"
-    assert "only 2 of 8 choices" in few.found.proof
+    assert "only 2 of 8 combinations" in few.found.proof
     assert "the time limit is 0.05 s" in few.found.proof
     assert len(few.modes) <= len(whole.modes)
     assert few.modes[0].goal

@@ -216,5 +216,5 @@ def test_what_is_moved_along_is_no_other_mode(seed: int):
 def test_poses_and_motors_of_formations_are_refused():
     made = formation(np.eye(3), [(1, 2), (2, 3), (1, 3)], bodies="position")
     for asked in ({"at": "x=1"}, {"at": "mode:1"}, {"real": True}):
-        with pytest.raises(BadRequest, match="this is a formation"):
+        with pytest.raises(BadRequest, match="a formation has no"):
             modes(made, **asked)

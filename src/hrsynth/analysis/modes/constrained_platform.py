@@ -47,7 +47,7 @@ class System(Value):
         tips = frozen(self.tips)
         if tips.shape != (len(self.curves), self.space) or not np.all(np.isfinite(tips)):
             raise BadRequest(
-                "tips of a platform", list(tips.shape), f"{len(self.curves)} by {self.space} finite numbers"
+                "shape of a platform's tips", list(tips.shape), f"{len(self.curves)} by {self.space} finite numbers"
             )
         object.__setattr__(self, "tips", tips)
 

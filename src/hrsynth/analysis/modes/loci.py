@@ -210,14 +210,14 @@ def extent(curves: Sequence[Reach], tips: Array) -> float:
 def _vector(values: ArrayLike) -> Array:
     array = frozen(values)
     if array.shape != (3,) or not np.isfinite(array).all():
-        raise BadRequest("a curve's vector", np.asarray(values).tolist(), "three finite numbers")
+        raise BadRequest("vector of a locus", np.asarray(values).tolist(), "three finite numbers")
     return array
 
 
 def _radius(what: str, value: float) -> float:
     radius = float(value)
     if not (radius > 0 and np.isfinite(radius)):
-        raise BadRequest(f"a {what} without a radius", radius, "a positive length in metres")
+        raise BadRequest(f"radius of a {what}", radius, "a positive length in metres")
     return radius
 
 
@@ -225,5 +225,5 @@ def _unit(values: ArrayLike) -> Array:
     array = _vector(values)
     size = length(array)
     if not size > 0:
-        raise BadRequest("a curve's direction", array.tolist(), "a vector that is not zero")
+        raise BadRequest("direction of a locus", array.tolist(), "a nonzero vector")
     return array if abs(size - 1.0) < 1e-15 else frozen(array / size)

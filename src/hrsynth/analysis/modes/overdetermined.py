@@ -87,7 +87,7 @@ def words(goal: bool, lost: bool, fitting: Sequence[float], out: int, open_: int
     if fitting:
         parts.append(
             f"{len(fitting)} fit{'s' * (len(fitting) == 1)} all legs to {max(fitting):.1e} characteristic "
-            "lengths (unproved match)"
+            "lengths, which does not prove it"
         )
     parts.append(f"{out} excluded by the legs in interval arithmetic" if out else "none excluded")
     if open_:

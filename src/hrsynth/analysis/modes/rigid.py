@@ -61,7 +61,7 @@ class Planar(System):
                 else 0.0
             )
             if off > SAME_DIRECTION:
-                raise BadRequest("a curve outside the plane of motion, sine", off, f"at most {SAME_DIRECTION}")
+                raise BadRequest("sine of a locus's angle with the plane of motion", off, f"at most {SAME_DIRECTION}")
         if self.surfaces:
             raise BadRequest("the loci of tips in a plane", "a surface", "points, lines and circles")
 
