@@ -110,7 +110,7 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
         except NotAccepted as reason:
             raise CertificateRefused(name, str(reason)) from None
         except (OSError, ValueError, RecursionError) as error:
-            why = getattr(error, "not JSON", None) or "it is not JSON"
+            why = getattr(error, "strerror", None) or "not JSON"
             raise BadRequest(
                 f"{name}: the certificate cannot be read: {why}",
                 remedy="Use a file that modes, derive or path wrote with --certificate.",

@@ -111,7 +111,7 @@ def displacement(mechanism: Mechanism, at: ClosedConfiguration, link: str) -> Ar
 
 
 def _held_measurements(found: AssemblyModes) -> Iterator[list[Any] | None]:
-    """Return the measured values: a link's directions and points, the link from which they are observed, and their
+    """Yield the measured values: a link's directions and points, the link from which they are observed, and their
     values at the goal; None of another kind."""
     setup, at = found.setup, found.goal
     measured = MeasuredRobot.of(setup, found.kind == "real")

@@ -259,7 +259,7 @@ def place(motion: Any, one: Any, other: Any) -> tuple[Vector, Vector]:  # p and 
 
 
 def path(record: Any) -> str:
-    need("the motions of the platform are missing" in record, "it does not say which motions the platform has")
+    need("motion" in record, "the motions of the platform are missing")
     motion, modes = record["motion"], record["modes"]
     nodes = [node(each, motion) for each in record["path"]]
     need(record["verdict"] in ("same aspect", "separated") and len(nodes) > 1, "another verdict, or too few poses")

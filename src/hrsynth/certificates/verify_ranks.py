@@ -1,7 +1,7 @@
 """Check a certificate of ranks: `python verify_ranks.py c.json`. Integers only.
 
-A stack of integer matrices has the rank told: a minor of it is not zero modulo a prime, and as many independent vectors
-as it has columns besides are annulled by it.
+A stack of integer matrices has the given rank: a minor of it is not zero modulo a prime, and as many independent
+vectors as it has columns besides are annulled by it.
 """
 
 import hashlib

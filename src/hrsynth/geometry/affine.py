@@ -40,12 +40,12 @@ class AffineForms:
 
     @property
     def spread(self) -> Array:
-        """Return an upper bound (…) of the distance of a value from the centre v[0]."""
+        """Upper bound (…) of the distance of a value from the centre v[0]."""
         return spread(np.abs(self.v[1:]).sum(axis=0), self.r)
 
     @property
     def size(self) -> Array:
-        """Return an upper bound of |value| (…)."""
+        """Upper bound of |value| (…)."""
         return (np.abs(self.v).sum(axis=0) + self.r) * (1 + AFFINE_ROUNDING)
 
     def __getitem__(self, index: Any) -> AffineForms:

@@ -83,8 +83,8 @@ def alike_after(here: ClosedConfiguration, step: Array) -> bool:
 
 
 def nears(here: ClosedConfiguration, step: Array, there: ClosedConfiguration) -> bool:
-    """Return the test of :func:`follows` for the end of a path, which may be a singularity or near one: the smallest
-    singular value may fall to zero, linearly and without a change of its sign, while all others stay alike."""
+    """Return True if a step passes :func:`follows` at the end of a path, which may be a singularity or near one: the
+    smallest singular value may fall to zero, linearly and without a change of its sign, while all others stay alike."""
     kept, ahead = here.strengths, there.strengths
     others = len(kept) - 1
     if not others <= len(ahead) <= len(kept):
@@ -185,7 +185,7 @@ class Signature:
     def motion(self) -> str:
         """Translations and other motions of the platform: 3T, 2T1R, 1T2R, 3T3R …"""
         parts = ((self.dof - self.turns, "T"), (self.turns, "R"))
-        return "fixed".join(f"{count}{letter}" for count, letter in parts if count) or "at rest"
+        return "".join(f"{count}{letter}" for count, letter in parts if count) or "fixed"
 
 
 @dataclass(frozen=True, eq=False)

@@ -102,7 +102,7 @@ class Coordinates(Value):
     def along(
         self, start: ClosedConfiguration, index: int, spans: tuple[float, float], count: int
     ) -> tuple[tuple[float, ClosedConfiguration], ...]:
-        """Yield closed configurations as one coordinate alone changes from ``start``, in the order of its values:
+        """Return closed configurations as one coordinate alone changes from ``start``, in the order of its values:
         ``count`` on each side, equally spaced as far as small steps lead within ``spans`` (metres, radians)."""
         down, up = (list(self._out(start, index, way, count)) for way in (-spans[0], spans[1]))
         return (*reversed(down), (float(self.values[index]), start), *up)

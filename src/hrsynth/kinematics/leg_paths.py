@@ -90,7 +90,7 @@ class MotionFactor:
 
 
 def ways(decomposition: LegDecomposition, leg: Leg) -> Iterator[tuple[MotionFactor, ...]]:
-    """Return the paths from the base to the link on which a leg ends, up to ``WAYS``, without those through a free
+    """Yield the paths from the base to the link on which a leg ends, up to ``WAYS``, without those through a free
     joint; if the platform is a point, any rotation about it is their last part."""
     mechanism = decomposition.mechanism
     frame, point = mechanism.links[mechanism.platform].pose, decomposition.point

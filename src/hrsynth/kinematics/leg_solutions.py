@@ -213,7 +213,7 @@ class _Law:
 def _kept_laws(
     first: MotionFactor, moving: MotionFactor | None, last: MotionFactor, x: Array, target: Field, end: LegEnd
 ) -> list[_Law]:
-    """Yield the laws of the first part for a point x of the last that ``moving`` moves to the target."""
+    """Return the laws of the first part for a point x of the last that ``moving`` moves to the target."""
     if first.axis is not None and first.slides:
         words = f"{_name(last)} would be at {{sought}} across the rail {_name(first)}, and reaches {{span}}"
         return [_height(moving, end.ball(x), normal, target, words) for normal in plane_axes(first.axis)]
@@ -289,7 +289,7 @@ def _tilt_misses(first: MotionFactor | None, x: Field, target: Field) -> list[Re
     if first is None or first.pair is None:
         return []
     outer, inner = first.pair
-    words = f"its far end should be at {{sought}} along the first axis of {_name(first)}, which reaches {{span}}"
+    words = f"its far end would be at {{sought}} along the first axis of {_name(first)}, and reaches {{span}}"
     miss = _height(MotionFactor(False, first.point, inner, ()), x, outer, target, words).miss()
     return [] if miss is None else [miss]
 

@@ -105,7 +105,7 @@ def wrists_beyond(model: PinocchioModel, q: Array) -> list[str]:
 
 
 def outside(model: PinocchioModel, q: Array, joints: Sequence[str] | None = None) -> list[str]:
-    """Yield the joints (default: of all), rotating or translating about one axis, whose coordinates are outside their
+    """Return the joints (default: of all), rotating or translating about one axis, whose coordinates are outside their
     limits (rotations modulo 2π), and the tilt limits that are exceeded."""
     mechanism = model.mechanism
     joints = [*mechanism.joints] if joints is None else joints

@@ -1,9 +1,9 @@
 """Pinocchio model of a mechanism: a spanning tree and exact loop constraints for every joint type.
 
-The twin measures lengths in characteristic lengths of the mechanism it was given (``length``), so that its Jacobians
-mix no metres with radians. Every tree joint's frame has the base's orientation at the zero configuration. A spherical
-loop holds two points together; any other loop is cut through the joint: the joint is added as a leaf and the leaf
-welded to the other link (:mod:`.loop_rows`).
+Lengths are in characteristic lengths of the given mechanism (``length``), so that Jacobians mix no metres with radians.
+Every tree joint's frame has the base's orientation at the zero configuration. A spherical loop joins two points; any
+other loop is cut through the joint: the joint is added as a leaf and the leaf welded to the other link
+(:mod:`.loop_rows`).
 """
 
 from __future__ import annotations

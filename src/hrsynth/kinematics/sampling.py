@@ -67,7 +67,7 @@ class Sample(Value):
 
     @cached_property
     def shown(self) -> list[int]:
-        """Return the number of independent values that each observation clearly shows: fewer if it is itself nearly
+        """Number of independent values that each observation clearly shows: fewer if it is itself nearly
         singular, as a circle that is observed edge-on."""
         rows = [self.relation.basis[self.relation.rows_of(place)] for place in range(len(self.relation.sizes))]
         return [int(np.sum(np.linalg.svd(each, compute_uv=False) > SURELY_SOMETHING)) for each in rows]

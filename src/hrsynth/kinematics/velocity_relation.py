@@ -44,7 +44,7 @@ class ObservationModel(Value):
 
     @property
     def of_platform(self) -> ObservationModel:
-        """Return the model of the platform's own twist alone, nothing observed."""
+        """Model of the platform's own twist alone, nothing observed."""
         return replace(self, observations=(), bodies=(), others=())
 
     def target(self, at: ClosedConfiguration) -> PoseAndValuesTask:

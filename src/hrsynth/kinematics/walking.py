@@ -55,7 +55,7 @@ def any_velocity(at: ClosedConfiguration, rng: np.random.Generator) -> Array:
 def random_walk(
     start: ClosedConfiguration, count: int, seed: int = 0, steps: int = 40
 ) -> Iterator[ClosedConfiguration]:
-    """Return ``count`` random configurations on the branch of ``start``: walks of up to ``steps`` small steps in all
+    """Yield ``count`` random configurations on the branch of ``start``: walks of up to ``steps`` small steps in all
     motions of the mechanism, each checked as by :func:`.sampling.sample`; one that ends early is begun again."""
     rng = np.random.default_rng(seed)
     weakest = WEAKEST * start.kernel()[1].weakest

@@ -114,7 +114,7 @@ class SampledMechanism:
             yield from self.slides(leg)
 
     def tips(self, leg: Leg) -> Iterator[tuple[PlatformPoint, BodyPoint]]:
-        """Return the joint centres of a leg, and the point that gives the position, that follow from the pose alone."""
+        """Yield the joint centres of a leg, and the point that gives the position, that follow from the pose alone."""
         for joint in self.joints(leg):
             if self.mechanism.base not in joint.links:
                 spot = self.centre(joint, joint.successor)

@@ -88,7 +88,7 @@ class _Place(NamedTuple):
 
     @property
     def f(self) -> Any:
-        """Return m₂ n₁ − m₁ n₂."""
+        """m₂ n₁ − m₁ n₂."""
         return self.m[1] * self.n[0] - self.m[0] * self.n[1]
 
     def motion(self, pick: int) -> tuple[Any, Any]:
@@ -268,14 +268,14 @@ def _angles(leg: LockedLegSection, x: Array) -> list[Array]:
 
 
 def _changes(leg: LockedLegSection, trace: _Trace) -> Iterator[Array]:
-    """Return points between which the rate of f in the remaining motion changes its sign."""
+    """Yield points between which the rate of f in the remaining motion changes its sign."""
     for pick in (1, 2):
         g = leg.place(trace.unknowns.T).rate(pick)
         yield from trace.unknowns[np.flatnonzero(np.sign(g[1:]) != np.sign(g[:-1]))]
 
 
 def _meetings(traces: Sequence[_Trace]) -> Iterator[Array]:
-    """Return pairs of points, (16,), near which images of pieces cross each other."""
+    """Yield pairs of points, (16,), near which images of pieces cross each other."""
     parts = [np.hstack([t.shown[:-1, 2:], t.shown[1:, 2:], t.unknowns[:-1]]) for t in traces]
     segments = np.vstack(parts) if parts else np.zeros((0, 12))
     start, step, places = segments[:, :2], segments[:, 2:4] - segments[:, :2], segments[:, 4:]

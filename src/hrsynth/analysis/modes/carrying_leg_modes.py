@@ -112,8 +112,8 @@ def polish_zeros(system: CarriedPlatform, q: Array, known: Iterable[Array] = ())
 
 
 def solve_carried(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0) -> tuple[Model, SystemModes]:
-    """List all modes, with the goal known to ``error`` (m). Raises ``UnsupportedLocus``, and ``Unsolved`` if not all
-    zeros that there may be are enclosed."""
+    """List all modes, with the goal known to ``error`` (m). Raises ``UnsupportedLocus``, and ``SystemNotSolved`` if not
+    all zeros that there may be are enclosed."""
     if not np.isfinite(error):
         raise UnsupportedLocus(
             measured.setup.robot.name, "the distance to the exact closed configuration is not bounded"

@@ -102,7 +102,7 @@ def _after(c: PoseCondition, freedom: Turn) -> float:
 
 
 def _sphere(c: PoseCondition) -> bool:
-    """True if it is a distance, not a height."""
+    """Return True if it is a distance, not a height."""
     return isinstance(c, OnRevolution) and float(c.f[2]) == -1.0 and float(c.f[1]) == 0.0
 
 

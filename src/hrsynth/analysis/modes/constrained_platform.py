@@ -79,7 +79,7 @@ class System(Value):
 
     @property
     def surfaces(self) -> bool:
-        """Return True if a tip is confined to a surface only."""
+        """True if a tip is confined to a surface only."""
         return len(curves_of(self.curves)) < len(self.curves)
 
     @property

@@ -57,7 +57,7 @@ def section() -> Array:
 
 @lru_cache(maxsize=1)
 def _start() -> tuple[Array, Array]:
-    """The section and its solutions (40, 8), unit vectors, found once by monodromy."""
+    """Section and its solutions (40, 8), unit vectors, computed once by monodromy."""
     x = np.load(Path(__file__).with_name("section.npy")).astype(complex)
     return section(), _newton(section(), x, 2)[0]
 
@@ -238,7 +238,7 @@ def _step(J: Array, x: Array, F: Array) -> Array:
     right = np.concatenate([-F, np.zeros((len(x), 1))], axis=1)[:, :, None]
     try:
         return np.asarray(np.linalg.solve(_border(J, x), right)[:, :, 0])
-    except np.linalg.LinAlgError:  # NumPy does not say of which
+    except np.linalg.LinAlgError:  # NumPy does not report which one
         if len(x) == 1:
             return np.full(x.shape, np.inf, dtype=complex)
         return np.concatenate([_step(J[k : k + 1], x[k : k + 1], F[k : k + 1]) for k in range(len(x))])

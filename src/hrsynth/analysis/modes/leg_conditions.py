@@ -47,7 +47,7 @@ _Reading = Callable[..., _Read]
 
 @dataclass(frozen=True, eq=False)
 class OriginAndUnit:
-    """Where lengths are counted from (m), and in which unit (m)."""
+    """Origin (m) and unit (m) of lengths."""
 
     origin: Array
     size: float

@@ -176,7 +176,7 @@ Quadrics = Revolution | SweptCircle
 
 
 def curves_of(reaches: Iterable[Reach]) -> list[int]:
-    """The places of those that have one freedom or none."""
+    """Indices of those that have one dof or none."""
     return [k for k, reach in enumerate(reaches) if not isinstance(reach, Surface)]
 
 

@@ -86,7 +86,7 @@ class Chain:
 
     @property
     def moved(self) -> float:
-        """How far axes and centres were moved so that they meet, coincide or are parallel, all together (m)."""
+        """Distance that axes and centres were moved so that they meet, coincide or are parallel, all together (m)."""
         return self.off + self.extent * _parallel_angles(self.bodies)
 
 
@@ -249,7 +249,7 @@ class _Walk:
         found[-1] = replace(found[-1], cranks=(*found[-1].cranks, crank))
 
     def _rods(self, found: list[ChainBody], edge: WordEdge, at: str) -> None:
-        """Return the observed rod, or the first: all have one direction."""
+        """Add the observed one of parallel rods, or the first: all have one direction."""
         if any(name in self.coordinates for name in edge.joints):
             raise LocusNotDerived("a motor fixes a rod")
         number = next((k for k, link in enumerate(edge.inside) if link in self.watched), 0)

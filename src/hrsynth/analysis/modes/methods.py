@@ -29,10 +29,10 @@ from .solve import SystemModes
 def without_couplings(
     measured: MeasuredRobot, goal: ClosedConfiguration
 ) -> tuple[MeasuredRobot, ClosedConfiguration] | None:
-    """The robot without its couplings, at the same place, and with what is measured held: so are joints that couplings
-    tie to motors that are held. It has all modes of the robot, and those at which couplings cannot be closed besides.
-    None where it has no couplings, sees less than all freedoms without them, or what is measured is of joints that are
-    one without them."""
+    """Return the robot without its couplings, at the same configuration, with its measured values fixed: so are joints
+    that couplings join to fixed motors. It has all modes of the robot, and those at which couplings are not closed.
+    None if it has no couplings, if not all dof are observed without them, or if observations are of joints that are one
+    without them."""
     mechanism, setup = goal.model.mechanism, measured.setup
     if not mechanism.couplings:
         return None

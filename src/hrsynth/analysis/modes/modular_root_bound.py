@@ -4,7 +4,7 @@ section 8).
 Linear combinations without a quadratic part give unknowns by others, exactly. B are the monomials whose degree in each
 of some groups of unknowns is below a cap, S those at a cap; rows are all multiples of the quadrics within the caps. If
 the columns S have full rank, each polynomial is one in the span of B modulo the quadrics: at most |B| + |S| - rank
-zeros, multiple ones counted so often, and no continuum. A rank modulo a prime is at most that over ℚ.
+zeros, multiple ones counted so often, and no curve of zeros. A rank modulo a prime is at most that over ℚ.
 """
 
 from __future__ import annotations

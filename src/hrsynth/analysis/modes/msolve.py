@@ -47,7 +47,7 @@ def parametrise(
     """All solutions of quadrics with integer coefficients; None where they are infinitely many.
 
     With ``nonzero`` those at which that one vanishes are left out, by one more unknown, its inverse.
-    Raises ``MissingExtra`` where msolve is not installed, ``Unsolved`` where it does not answer in time."""
+    Raises ``MissingExtra`` where msolve is not installed, ``SystemNotSolved`` where it does not answer in time."""
     count = len(quadrics[0].A) - 1
     program = executable()
     with tempfile.TemporaryDirectory() as folder:

@@ -1,4 +1,4 @@
-"""Near modes: poses that a measurement with an error cannot tell from the goal (docs/pages/proofs.md, section 8).
+"""Near modes: poses that differ from the goal by no more than the measurement bound (docs/pages/proofs.md, section 8).
 
 Lists of modes are of the numbers as they are. Where more is observed than needed, a mode of exact dimensions is not one
 of rounded ones, but its measured values differ by no more than the rounding, and the servo loop has an equilibrium

@@ -183,7 +183,7 @@ def snap_centres(system: System) -> tuple[System, tuple[SnappedPoints, ...]]:
     smallest = min((each[0] for each in apart if each not in accepted), default=np.inf)
     if largest * RANK_GAP > smallest:
         raise GeometryAmbiguous(
-            "distances of joint centres that may be one", largest / system.size, smallest / system.size, RANK_GAP
+            "joint centres that may coincide", largest / system.size, smallest / system.size, RANK_GAP
         )
     if largest == 0.0:
         return system, ()

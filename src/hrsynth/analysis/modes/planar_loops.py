@@ -179,7 +179,7 @@ class PlanarLoops(System):
 
     @cached_property
     def most(self) -> int:
-        """Return a bound of the isolated closed configurations from degrees, with unknowns eliminated or not."""
+        """Bound of the isolated closed configurations from degrees, with unknowns eliminated or not."""
         groups = groupings(self.angles, self.slides, [loop.used_coordinates() for loop in self.loops])
         return min(self.residues.most_by_degrees(), *(bezout(self.forms, each) for each in groups))
 

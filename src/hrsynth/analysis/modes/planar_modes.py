@@ -59,8 +59,8 @@ def proposals(forms: Sequence[dict[Exponents, complex]], angles: int, enough: in
 
 
 def solve_loops(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0) -> tuple[Model, SystemModes]:
-    """All modes, with the goal known to ``error`` (m). Raises ``UnsupportedLocus``, and ``Unsolved`` where not all
-    closings are enclosed that there may be."""
+    """All modes, with the goal known to ``error`` (m). Raises ``UnsupportedLocus``, and ``SystemNotSolved`` where not
+    all closings are enclosed that there may be."""
     refused = list[SystemNotSolved]()
     for system in islice(systems(measured, goal), LOOP_SYSTEMS):
         system = replace(system, error=system.error + error)

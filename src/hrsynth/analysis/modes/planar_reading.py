@@ -32,8 +32,8 @@ def planar_loops(measured: MeasuredRobot, goal: ClosedConfiguration) -> PlanarLo
 
 
 def systems(measured: MeasuredRobot, goal: ClosedConfiguration) -> Iterator[PlanarLoops]:
-    """The mechanism, with more and more left to be measured besides; last where loops that are left out ask more than
-    their own unknowns can meet, so that closings of the others need not be closings. Raises ``UnsupportedLocus``."""
+    """Return the mechanism, with fewer and fewer values locked in its loops; last those whose left out loops have more
+    conditions than unknowns, so that solutions of the others need not close them. Raises ``UnsupportedLocus``."""
     seen, reason, tight, looser = measured.observation_model.observations, "", False, list[PlanarLoops]()
     for size in range(len(seen), 0, -1):
         for chosen in combinations(seen, size):

@@ -66,7 +66,7 @@ class Zero:
 
     @cached_property
     def _profile(self) -> float:
-        """Return the factor by which the numbers of a profile are less exact than others."""
+        """Factor by which the numbers of a profile are less exact than others."""
         f = getattr(self.condition, "f", None)
         return 1.0 if f is None else (1.0 + float(np.abs(f).sum())) ** 1.5
 

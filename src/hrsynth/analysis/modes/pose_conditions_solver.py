@@ -153,8 +153,8 @@ def solve_posed(
     measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0, time_limit: float = EFFORT
 ) -> tuple[Model, SystemModes]:
     """All modes of all choices of branches together, with the goal known to ``error`` (m). Raises ``UnsupportedLocus``,
-    and ``Unsolved`` where not all poses are enclosed that there may be, or the choices need more than ``time_limit``
-    (s)."""
+    and ``SystemNotSolved`` where not all poses are enclosed that there may be, or the choices need more than
+    ``time_limit`` (s)."""
     systems = [
         replace(each, error=each.error + max([error, *(sight.error(error, goal) for sight in each.seen)]))
         for each in pose_platform(measured, goal)
@@ -188,7 +188,7 @@ def solve_posed(
 
 
 def _forms(measured: MeasuredRobot, system: PosedPlatform) -> SquareForms:
-    """As many of its conditions as freedoms. Raises ``UnsupportedLocus``, ``Unsolved``."""
+    """Return as many of its conditions as dof. Raises ``UnsupportedLocus``, ``SystemNotSolved``."""
     forms = SquareForms.of(system.conditions, system.poses)
     if forms is None:
         raise UnsupportedLocus(measured.setup.robot.name, "the conditions of its legs do not determine isolated poses")

@@ -44,7 +44,7 @@ class Proposed:
 
 
 def wholes(system: System, number: int = 0) -> Iterator[PoseSystem]:
-    """The choices of legs with just as many equations as freedoms, then those with too many."""
+    """Yield the choices of legs with just as many equations as dof, then those with too many."""
     chart = system.chart(number)
     for size in range(1, len(system.curves) + 1):
         for legs in combinations(range(len(system.curves)), size):
@@ -60,7 +60,7 @@ def wholes(system: System, number: int = 0) -> Iterator[PoseSystem]:
 def propose_roots(part: PoseSystem, enough: int | None) -> Proposed | None:
     """All solutions, up to rounding, ``enough`` at most; None where there seem to be infinitely many.
 
-    Raises ``MissingExtra``, ``Unsolved`` where msolve is needed."""
+    Raises ``MissingExtra``, ``SystemNotSolved`` where msolve is needed."""
     return by_msolve(part) if part.chart.study is None else by_homotopy(part, enough)
 
 
@@ -94,7 +94,7 @@ def _resting(part: PoseSystem) -> tuple[int, ...]:
 def by_msolve(part: PoseSystem) -> Proposed | None:
     """All solutions, distinct ones once; None where they are infinitely many.
 
-    Raises ``MissingExtra``, ``Unsolved``."""
+    Raises ``MissingExtra``, ``SystemNotSolved``."""
     equations, nonzero = part.equations(), part.chart.nonzero
     answer = parametrise(equations)
     if answer is None and nonzero is not None:

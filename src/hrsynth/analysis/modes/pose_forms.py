@@ -152,7 +152,7 @@ class SquareForms:
 
     @property
     def size(self) -> int:
-        """Return the number of forms of that degree."""
+        """Number of forms of that degree."""
         return len(exponents(self.shape, self.degree))
 
     @cached_property
@@ -210,9 +210,9 @@ def _times(shape: tuple[int, int], t: int, count: int, what: str) -> Array:
 
 
 def proposals(forms: SquareForms, t: int, number: int, k: int) -> tuple[Array, Array] | None:
-    """All poses to rounding, from the forms of degree t, ``number`` of them on the multiples of wᵏ: coordinates y
-    (n, a), of unit quaternions, complex, and positions (n, 3); None where they are not told apart, or where there are
-    more functionals than isolated zeros could span: some zeros are not isolated, and then these are fewer."""
+    """Return all poses to rounding, from the forms of degree t, ``number`` of them on the multiples of wᵏ: coordinates
+    y (n, a), of unit quaternions, complex, and positions (n, 3); None if they are not separated, or if there are more
+    functionals than isolated zeros could span: some zeros are not isolated, and then these are fewer."""
     from scipy.linalg import lstsq, qr
 
     shape = forms.shape

@@ -239,7 +239,8 @@ class Spatial(System):
                 yield self._square(legs, len(moving) == len(self.curves) == 3)
 
     def _square(self, legs: tuple[int, ...], whole: bool) -> SquareSystem:
-        """Yield three distances between three tips; with fixed tips, given last, those that determine the others."""
+        """Return the system of three distances between three tips; with fixed tips, given last, those that determine
+        the others."""
         curves = tuple(curve for k in legs if not isinstance(curve := self.curves[k], Surface))
         b = self.tips[list(legs)]
         unknowns = tuple(curve for curve in curves if not isinstance(curve, Point))

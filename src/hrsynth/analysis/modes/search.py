@@ -1,7 +1,7 @@
 """Modes of any closed loop by search: the whole robot is closed from random starts with its measured values fixed.
 
 Nothing is assumed of the legs, so every robot has an answer; and nothing is proved: what is listed was found, and there
-may be more. How often each mode was met tells how well the search has covered them.
+may be more. The number of hits of each mode shows how well the search has covered them.
 """
 
 from __future__ import annotations
@@ -53,11 +53,7 @@ class ModeSearch:
     def words(self) -> str:
         """Description of the search, and how well it covers the modes."""
         once = sum(mode.met == 1 for mode in self.modes[0 if any(motion.goal for motion in self.self_motions) else 1 :])
-        rare = (
-            f"; {once} of the modes {'was' if once == 1 else 'were'} found only once"
-            if not once
-            else f"; {once} of the modes {'was' if once == 1 else 'were'} met only once"
-        )
+        rare = f"; {once} of the modes {'was' if once == 1 else 'were'} found only once" if once else ""
         moving = sum(motion.hits for motion in self.self_motions)
         on = f", {moving} of them on self-motions" if moving else ""
         return f"found from {self.starts} random starts of the whole robot, of which {self.closed} closed{on}{rare}"

@@ -1,8 +1,8 @@
 """Self-motions: curves of modes, along which the robot moves with constant measured values.
 
-At a closing where the measurements leave the platform a freedom to first order, the robot is led along it by steps that
-are closed again (predictor and corrector). Where it stays closed over a distance a self-motion is *found*; where it
-does not, the closing is a singular pose. Samples of a curve prove neither.
+Where the measured values leave the platform a dof to first order, the robot is led along it by steps that are closed
+again (predictor and corrector). If it stays closed over a distance a self-motion is *found*; if not, the pose is
+singular. Samples of a curve prove neither.
 """
 
 from __future__ import annotations
@@ -178,7 +178,7 @@ class _Followed:
 
     @property
     def far(self) -> float:
-        """How far the platform went, shift and turn together."""
+        """Distance of the platform's motion, shift and rotation together."""
         return self.shift + self.turn
 
 

@@ -287,7 +287,7 @@ def _halves(x: Any) -> list[tuple[Any, Any]]:
 
 
 def solve_loop(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0) -> tuple[Model, SystemModes]:
-    """All modes, with the goal known to ``error`` (m). Raises ``UnsupportedLocus`` and ``Unsolved``."""
+    """All modes, with the goal known to ``error`` (m). Raises ``UnsupportedLocus`` and ``SystemNotSolved``."""
     from flint import ctx
 
     if not np.isfinite(error):

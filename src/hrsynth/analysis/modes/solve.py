@@ -76,8 +76,8 @@ class SystemMode(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SquareSolution(Value):
-    """A square part of a system with all its solutions; ``modes`` are its real ones, in the order of ``roots.real``,
-    and ``kept`` tells which of them are modes of the whole system."""
+    """Square part of a system with all its solutions; ``modes`` are its real ones, in the order of ``roots.real``,
+    and ``kept`` marks those that are modes of the whole system."""
 
     system: System
     part: Part
@@ -118,8 +118,8 @@ class SystemModes(Value):
 
     @classmethod
     def of_more(cls, modes: Sequence[SystemMode], out: Sequence[SystemMode], proof: str, bound: str) -> SystemModes:
-        """Where more is told than a square part needs, all of whose zeros are known: those of its real zeros that are
-        not excluded, as others are (``out``), by all that is told."""
+        """Return the modes of a square part with further conditions, all of whose zeros are known: its real zeros
+        without those that further conditions exclude (``out``)."""
         fitting = tuple(mode for mode in modes if mode.proved or mode.residual <= VANISHES)
         open_ = len(modes) - len(fitting)
         told = words(True, False, [mode.residual for mode in fitting if not mode.proved], len(out), open_)
@@ -141,12 +141,12 @@ class SystemModes(Value):
 
 
 def solve(system: System, *, near: bool = True, goal: Array | None = None) -> SystemModes:
-    """All modes of a system: the solutions of its first square part that is not degenerate at which all tips fit.
+    """List all modes of a system: the solutions of its first regular square part at which all tips fit.
 
-    Where more is observed than needed, the ``goal``, coordinates of a pose at which all tips fit by construction, is
+    With redundant observation the ``goal``, coordinates of a pose at which all tips fit by construction, is
     proved to be a mode; others are modes that fit if their residual is at most ``VANISHES`` and they are not excluded.
-    ``near`` are the poses with a residual up to ``NEAR_MODE`` where the sum of squares is stationary, found from
-    several square parts (unless ``near`` is false).
+    ``near`` are the poses with a residual up to ``NEAR_MODE`` where the sum of squares is stationary, from several
+    square parts (unless ``near`` is false).
     Where no square part decides the pose, tips on surfaces are left to a solver that proposes poses: a homotopy for
     a rigid body, else msolve (``MissingExtra`` where that is not installed).
     """
@@ -174,7 +174,7 @@ def solve_by_msolve(system: System, *, near: bool = True, goal: Array | None = N
     """All modes of a system in the pose's own coordinates, proposed by msolve and enclosed here.
 
     As :func:`solve`, but solutions that coincide are counted once, and near modes are looked for from the solutions of
-    one choice of legs alone. Raises ``MissingExtra``, ``Unsolved``.
+    one choice of legs alone. Raises ``MissingExtra``, ``SystemNotSolved``.
     """
     system, told = snap_centres(system)
     return replace(_propose(system, near, goal, lambda part, enough: by_msolve(part)), snapped=told)

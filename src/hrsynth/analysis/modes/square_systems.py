@@ -22,7 +22,7 @@ class SquareSystem:
     """One choice of legs with as many equations as unknowns.
 
     ``unknowns`` are the curves whose parameters are solved for; ``build`` gives the equations from their conics;
-    ``place`` turns parameters (n,) into the coordinates of the system's pose; ``whole`` says that no other equation is
+    ``place`` turns parameters (n,) into the coordinates of the system's pose; ``whole``: no other equation is
     left; ``exact`` gives the points that the unknowns stand for, where these are not those of the curves.
     """
 
@@ -66,7 +66,7 @@ def resting(legs: tuple[int, ...], q: Array, whole: bool) -> SquareSystem:
 
 def three_surfaces(legs: Sequence[tuple[int, Surface]], whole: bool) -> tuple[float, SquareSystem]:
     """The points on the surfaces of three legs, and the sine of the angle between the two planes: where that vanishes
-    the surfaces have no point in common, or a continuum of them."""
+    the surfaces have no point in common, or a curve of them."""
     first, second, last = _sort_surfaces([surface for _, surface in legs])
     all_three = (first, second, last)
     frame = spatial_frame(all_three, extent(all_three, np.zeros((1, 3))))

@@ -1,9 +1,9 @@
 """Loci of the tips of a hidden robot with fixed directions, from the mechanism itself.
 
-Each leg's joints say it, all branches of it (:mod:`.reaches`). Where they do not by the known laws, the pattern of the
-held legs names the tangent of the tip's path, or the normal of the surface that it stays on; then the path or surface
-through the goal is written down and checked by moving the leg on its own along all of its freedoms: found, and not
-known to be all.
+They follow from each leg's joints, for all leg solutions (:mod:`.loci_from_joints`). If not by the known laws, the
+pattern of the locked legs gives the tangent of the tip's path, or the normal of the surface that it stays on; then the
+path or surface through the goal is checked by moving the leg on its own along all of its dof: found, and not known to
+be all.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ from .loci_from_joints import reaches
 from .locked_chain import Chain, LocusNotDerived, chain
 
 MOVES = (-0.4, -0.15, 0.15, 0.4)
-"""How far a leg is moved along a freedom to check where its tip can be (characteristic lengths, radians)."""
+"""Distance that a leg is moved along a dof to check its tip's locus (characteristic lengths, radians)."""
 
 MIXED = 4
-"""Combinations of its freedoms along which a leg with several of them is moved besides."""
+"""Number of combinations of its dof along which a leg with several of them is moved too."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,8 +49,8 @@ class Tip(Value):
     """Tip of a locked leg: the body that carries it, where (3,) in the body's frame (m), and the curve or surface in
     the base frame (m) on which it is at the goal.
 
-    ``others`` are those of the leg's other branches, each with what it makes of an error of the goal; ``doubt`` says
-    why there may be more, None where these are all.
+        ``others`` are those of other leg solutions, each with its gain of an error of the goal; ``doubt`` is the reason
+        why there may be more, None if these are all.
     """
 
     leg: str
@@ -343,8 +343,8 @@ def _apart(pattern: ConstraintPattern, goal: ClosedConfiguration, q: Array) -> t
 def _held_paths(
     own: Sequence[Observation], reference: str, leg: LockedLeg, goal: ClosedConfiguration, place: Array
 ) -> list[Array]:
-    """Positions of a tip when its leg alone, with what is measured held, is moved along each of its freedoms, and along
-    some random combinations of them."""
+    """Return the positions of a tip when its leg alone, with fixed measured values, is moved along each of its dof, and
+    along some random combinations of them."""
     rest = decompose(rezero(goal))
     model = PinocchioModel(alone(rest, rest.leg(leg.label)), goal.model.length)
     held = FixedValuesTask.at(model, model.q0, reference, own)

@@ -39,9 +39,9 @@ from .square_systems import SquareSystem, resting, single, three_surfaces
 class Translating(Shifting):
     """A platform that only translates: q = p, shape (3,). ``tips`` has shape (n, 3).
 
-    What each tip can reach, moved by −b_i, holds the point p. Two curves of one plane meet as often as their degrees
-    say; two others do not meet at all unless one condition holds, so there one is met with a plane of the other, and
-    the rest checked.
+    The locus of each tip, moved by −b_i, contains the point p. Two curves of one plane meet as often as their degrees
+    allow; two others do not meet at all unless one condition holds, so there one is met with a plane of the other, and
+    the remaining condition is checked.
     """
 
     freedoms = 3
@@ -141,8 +141,9 @@ class Articulated(Shifting):
     """Two bodies that translate: q = (p, θ), p (3,) the first body's origin, θ where the second is on ``slide``, a
     circle about it or (s for θ, in metres) a line.
 
-    tip_i = p + b_i on the first body, p + slide(θ) + b_i on the second; ``bodies`` says which, 0 or 1, for each
-    leg. The square systems take one leg of each body: with the tip of one as p, the sum (or difference) of two circles
+    tip_i = p + b_i on the first body, p + slide(θ) + b_i on the second; ``bodies`` is 0 or 1 for each
+        leg. The square systems take one leg of each body: with the tip of one as p, the sum (or difference) of two
+        circles
     lies on the third curve.
     """
 
