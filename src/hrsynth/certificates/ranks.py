@@ -20,8 +20,8 @@ def certificate(found: Derivation) -> dict[str, Any]:
     twists of all bodies), Y: the rates of what is observed, at one random rational instance of the architecture, and
     the ranks of A, [A; X], [A; Y], [A; Y; X].
 
-        The legs observe rank [A; X] + rank [A; Y] − rank [A; Y; X] − rank A of the platform's dof. Raises
-        ``NoCertificate`` if there are no instances."""
+    The legs observe rank [A; X] + rank [A; Y] − rank [A; Y; X] − rank A of the platform's dof. Raises
+    ``NoCertificate`` if there are no instances."""
     exact, name = architecture(found.setup), found.robot.name
     try:
         at = exact.instance(0)

@@ -58,7 +58,7 @@ class SingularitySlice(Record):
     cusps: Recorded[tuple[SectionPoint, ...]]
     nodes: Recorded[tuple[tuple[SectionPoint, SectionPoint], ...]]
 
-    held_record = Shown(str, lambda self: self.robot.labels[0], As("held"))
+    held_record = Shown(str, lambda self: self.robot.labels[0], As("fixed"))
     directions = Shown(list[str], lambda self: self.robot.labels[1:])
 
 

@@ -32,7 +32,7 @@ def planar_loops(measured: MeasuredRobot, goal: ClosedConfiguration) -> PlanarLo
 
 
 def systems(measured: MeasuredRobot, goal: ClosedConfiguration) -> Iterator[PlanarLoops]:
-    """Return the mechanism, with fewer and fewer values locked in its loops; last those whose left out loops have more
+    """Yield the mechanism, with fewer and fewer values locked in its loops; last those whose left out loops have more
     conditions than unknowns, so that solutions of the others need not close them. Raises ``UnsupportedLocus``."""
     seen, reason, tight, looser = measured.observation_model.observations, "", False, list[PlanarLoops]()
     for size in range(len(seen), 0, -1):

@@ -129,7 +129,7 @@ class Eliminant:
 
     ``bound`` is the degree that it has when no solution lies at infinity. ``others`` gives, for a ball about a root,
     the balls of the other unknowns; where a denominator may be zero these are not finite. ``several`` gives for such a
-        root all that the other unknowns can be, or None where that is not known.
+    root all that the other unknowns can be, or None where that is not known.
     """
 
     polynomial: fmpz_poly

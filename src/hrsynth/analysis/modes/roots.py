@@ -67,7 +67,7 @@ class SolutionSet:
     """All solutions of a square system; ``complex`` counts them with multiplicity.
 
     ``degree`` is that of the polynomial that was isolated, ``extraneous`` how many roots of it lie at infinity.
-        ``continuum``: all such polynomials vanish; ``closest``: the smallest distance between two solutions.
+    ``continuum``: all such polynomials vanish; ``closest``: the smallest distance between two solutions.
     """
 
     complex: int = 0

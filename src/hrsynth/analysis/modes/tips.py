@@ -49,8 +49,8 @@ class Tip(Value):
     """Tip of a locked leg: the body that carries it, where (3,) in the body's frame (m), and the curve or surface in
     the base frame (m) on which it is at the goal.
 
-        ``others`` are those of other leg solutions, each with its gain of an error of the goal; ``doubt`` is the reason
-        why there may be more, None if these are all.
+    ``others`` are those of other leg solutions, each with its gain of an error of the goal; ``doubt`` is the reason
+    why there may be more, None if these are all.
     """
 
     leg: str

@@ -141,10 +141,9 @@ class Articulated(Shifting):
     """Two bodies that translate: q = (p, θ), p (3,) the first body's origin, θ where the second is on ``slide``, a
     circle about it or (s for θ, in metres) a line.
 
-    tip_i = p + b_i on the first body, p + slide(θ) + b_i on the second; ``bodies`` is 0 or 1 for each
-        leg. The square systems take one leg of each body: with the tip of one as p, the sum (or difference) of two
-        circles
-    lies on the third curve.
+    tip_i = p + b_i on the first body, p + slide(θ) + b_i on the second; ``bodies`` is 0 or 1 for each leg. The square
+    systems take one leg of each body: with the tip of one as p, the sum (or difference) of two circles lies on the
+    third curve.
     """
 
     bodies: tuple[int, ...]
