@@ -228,5 +228,5 @@ def test_turns_are_not_counted_modulo_a_whole_one(angle: float) -> None:
 
 def test_degrees_of_a_slide_are_refused() -> None:
     for given in ("motors:10deg,0,0", "joints:slide_1=10deg"):
-        with pytest.raises(BadRequest, match="slide_1 slides"):
+        with pytest.raises(BadRequest, match="unit of prismatic joint slide_1"):
             hrsynth.check("3rps", at=given)
