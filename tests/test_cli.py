@@ -1005,7 +1005,7 @@ def test_modes_of_too_few_legs_are_a_continuum(run, tmp_path: Path):
     picture = tmp_path / "modes.png"
     answer = run("modes", "delta", "--observe", "1", "-o", picture)
     assert answer.status == 0
-    assert "a continuum of dimension 1" in answer.out
+    assert "a continuous family of dimension 1" in answer.out
     assert "is not drawn" in answer.err
     assert not picture.exists()
 

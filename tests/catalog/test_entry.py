@@ -196,7 +196,7 @@ def test_verdicts_are_exact_and_confirmed(name):
 def test_what_does_not_move_has_no_verdict():
     assert entry("3(Pz*-S)+3(Rt*-S)")["refused"].startswith("its loops let no link move")
     other = entry("3(Ra*-Ra-Ra-Ra-Rb)")["refused"]  # each leg is a four-bar whose coupler is not watched
-    assert other.startswith("neither the platform nor a watched segment moves, but other links do (link_1_1, ")
+    assert other.startswith("neither the platform nor an observed segment moves, but other links do (link_1_1, ")
     with pytest.raises(BadRequest):
         entry("3(Rz*-Q-Rz)")
 

@@ -191,7 +191,7 @@ def test_ranks_are_those_of_an_independent_elimination(legs):
     lost = seen["A", "Y", "X"] - seen["A", "Y"]
     derived = hrsynth.derive(hrsynth.load("quattro"), legs.split(","))
     assert derived.dof - lost == derived.exact.rank
-    assert hrsynth.verify(record).endswith(f": the legs see {derived.exact.rank} of 4 freedoms at this instance")
+    assert hrsynth.verify(record).endswith(f": the legs observe {derived.exact.rank} of 4 dof at this instance")
 
 
 def attacked(text: str, count: int, seed: int) -> Counter[str]:
@@ -525,7 +525,7 @@ def test_false_ranks_are_refused():
 def test_freedoms_are_counted_only_where_the_loops_rank_is_told():
     """Without rank A all joints' rates would count as the platform's freedoms."""
     record = json.loads(ranks("1,2"))
-    assert "of 4 freedoms" in hrsynth.verify(record, "quattro")
+    assert "of 4 dof" in hrsynth.verify(record, "quattro")
     record["stacks"] = [each for each in record["stacks"] if each["of"] != ["A"]]
     record["sha256"] = verify_ranks.digest(record)
     assert "freedoms" not in hrsynth.verify(record)

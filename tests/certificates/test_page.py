@@ -20,7 +20,7 @@ from hrsynth.certificates.verify_certificate import KINDS
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "pages" / "certificate_files.md"
 CAMERA = {
     "camera": "eye=base@0.3,0.1,0",
-    "see": ["point:platform@0.1,0,0", "point:platform@-0.1,0.1,0", "point:platform@0,0.1,0.1"],
+    "sensor": ["point:platform@0.1,0,0", "point:platform@-0.1,0.1,0", "point:platform@0,0.1,0.1"],
 }
 ASKED: dict[str, tuple[str, str | None, dict[str, Any]]] = {
     "rrrrr_m1": ("rrrrr_m1", None, {}),

@@ -224,7 +224,7 @@ NUMBER, PLACE = "a number in words", ("path", 0, 0, 0)
 FORGERIES = {
     "a path out of the plane": (lifted, "a shift that the platform does not have"),
     "a tilted platform": (tilted, "a turn that the platform does not have"),
-    "no motions": (old, "does not say which motions"),
+    "no motions": (old, "motions of the platform are missing"),
     "motions in words": (put("xy", "motion", "along"), "a vector of another length"),
     "a quaternion of zero": (put(["0", "0"], "path", 1, 1), "a quaternion that may be zero"),
     "home of zero": (put(["0"] * 4, "motion", "home"), "a quaternion that may be zero"),

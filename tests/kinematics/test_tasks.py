@@ -16,7 +16,7 @@ from kinematics.robots import setting_of
 
 
 @pytest.mark.parametrize(
-    ("robot", "see"),
+    ("robot", "sensor"),
     [("quattro", ()), ("orthoglide", ()), ("3rrr_m1", ()), ("gough_stewart", ("c=point:platform@0,0,0",))],
 )
 def test_together_every_way_ends_where_it_ends_alone(robot: str, sensor: tuple[str, ...]) -> None:

@@ -163,7 +163,7 @@ def test_what_is_refused_is_one_sentence():
     page = read(made(*FAST)[1])
     told = [text_of(each) for each in page.xpath("//*[@class='refused']")]
     assert told == [
-        "The measurements leave 1 of the platform's freedoms undetermined: a continuum of dimension 1.",
+        "The measured values leave 1 of the platform's dof undetermined: a continuous family of dimension 1.",
         "There is no accuracy map. The error is infinite at every pose, the legs do not see translation along z (at "
         "the zero configuration).",
     ]

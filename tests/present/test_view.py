@@ -148,7 +148,7 @@ def test_there_is_a_ghost_for_each_mode_but_the_pose_itself(name: str):
     listed = modes(load(name), list(found.setup.labels))
     if listed.found.continuous_family is not None:
         assert not found.mode_outlines
-        assert any("continuum" in note for note in found.notes)
+        assert any("continuous family" in note for note in found.notes)
         return
     assert len(found.mode_outlines) == len(listed.modes) - 1
     for outline in found.mode_outlines:

@@ -25,10 +25,29 @@ from .verify_ranks import RanksNotAccepted
 
 
 def certificate(found: AssemblyModes | Derivation | PathAnswer) -> dict[str, Any]:
-    """The certificate of a complete list of modes, of a derivation's verdict in exact arithmetic, or of a path: plain
-    data that ``verify`` checks, or one of the files ``verify_certificate.py``, ``verify_ranks.py`` and
-    ``verify_path.py``. Raises ``NoCertificate``.
+    """Return the certificate of a result, as data that a checker accepts without this package.
 
+    Parameters
+    ----------
+    found
+        Result of ``modes`` with a complete list, of ``derive`` with a verdict in exact arithmetic, or of ``path`` with
+        a certified verdict.
+
+    Returns
+    -------
+    dict
+        Content of a JSON file for ``verify``, or for one of ``verify_certificate.py``, ``verify_ranks.py`` and
+        ``verify_path.py``. Lengths are in characteristic lengths, numbers are fractions as text.
+
+    Raises
+    ------
+    NoCertificate
+        If the result has no proof that the checkers accept.
+    BadRequest
+        If the result is of another kind.
+
+    Examples
+    --------
     >>> hrsynth.certificate(hrsynth.modes("3rrr_m1"))["complex"]
     6
     """
@@ -38,20 +57,40 @@ def certificate(found: AssemblyModes | Derivation | PathAnswer) -> dict[str, Any
         return ranks.certificate(found)
     if isinstance(found, PathAnswer):
         return paths.certificate(found)
-    raise BadRequest("what has a certificate", type(found).__name__, "what modes, derive or path answer")
+    raise BadRequest(
+        f"{type(found).__name__}: a result without certificates", remedy="Use a result of modes, derive or path."
+    )
 
 
 def write_certificate(found: AssemblyModes | Derivation | PathAnswer) -> bytes:
-    """A certificate as the content of a file."""
+    """Return a certificate as the content of a file."""
     return (json.dumps(certificate(found), indent=1) + "\n").encode()
 
 
 def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path | None = None) -> str:
-    """What a certificate, or a certificate file, proves, in words, by the checker's own computation; with ``robot`` it
-    is also checked that its geometry is that robot's, to ``SAME_RELATION`` of its size.
+    """Verify a certificate by the checker's own computation, and return what it proves.
 
-    Raises ``CertificateRefused`` if it does not hold, ``BadRequest`` for a file that cannot be read.
+    Parameters
+    ----------
+    source
+        Certificate, or path of its file.
+    robot
+        Robot whose geometry must be that of the certificate, to ``SAME_RELATION`` characteristic lengths.
 
+    Returns
+    -------
+    str
+        Claim that is proved.
+
+    Raises
+    ------
+    CertificateRefused
+        If the certificate is not accepted.
+    BadRequest
+        If the file is not readable.
+
+    Examples
+    --------
     >>> hrsynth.verify(hrsynth.certificate(hrsynth.modes("3rrr_m1")))
     '2 real of 6 complex poses, and no other; the robot closes at 2 of the real ones, to 1e-9'
     """
@@ -63,20 +102,22 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
             with open_regular(file) as content:
                 text = content.read(verify_certificate.LENGTH + 1).decode()
             if len(text) > verify_certificate.LENGTH:
-                raise BadRequest("the certificate is too long", name, f"up to {verify_certificate.LENGTH} characters")
+                raise BadRequest(
+                    f"{name}: the certificate is longer than {verify_certificate.LENGTH} characters",
+                    remedy="Use a file that --certificate wrote.",
+                )
             record = json.loads(text, object_pairs_hook=once)
         except NotAccepted as reason:
             raise CertificateRefused(name, str(reason)) from None
         except (OSError, ValueError, RecursionError) as error:
-            why = getattr(error, "strerror", None) or "it is not JSON"
+            why = getattr(error, "strerror", None) or "not JSON"
             raise BadRequest(
-                f"the certificate cannot be read: {why}",
-                name,
-                "a file that modes, derive or path wrote with --certificate",
+                f"{name}: the certificate cannot be read: {why}",
+                remedy="Use a file that modes, derive or path wrote with --certificate.",
             ) from None
     try:
         if not isinstance(record, dict):
-            raise NotAccepted("it is not an object")
+            raise NotAccepted("it is not a JSON object")
         checkers = {"path": verify_path, "ranks": verify_ranks}
         checker = checkers.get(str(record.get("claim")), verify_certificate)
         proved = checker.verify(record) if file is None else _within_limits(Path(str(checker.__file__)), file)
@@ -89,14 +130,14 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
         except (BadRequest, NoCertificate, PoseNotReached) as error:
             raise CertificateRefused(name, f"it is not for {robot.name}: {error}") from None
         except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
-            raise CertificateRefused(name, f"it does not say which legs and pose it is for ({error!r})") from None
+            raise CertificateRefused(name, f"it does not name the legs and pose of its claim ({error!r})") from None
         if not _same(record, own):
             raise CertificateRefused(name, f"it is not for {robot.name}: other geometry, legs or pose")
     return f"{proved}{ranks.describe_ranks(record)}" if record["claim"] == "ranks" else proved
 
 
 def _within_limits(checker: Path, file: Path) -> str:
-    """What the checker says of a file, in a process of its own; raises ``NotAccepted``, ``BadRequest``."""
+    """Run the checker on a file, in a process of its own; raises ``NotAccepted``, ``BadRequest``."""
     verdict, _, said = output(checker, str(file), seconds=VERIFY_SECONDS).decode().strip().partition(": ")
     if verdict != "accepted":
         raise NotAccepted(said)
@@ -104,7 +145,7 @@ def _within_limits(checker: Path, file: Path) -> str:
 
 
 def _same(one: Any, other: Any) -> bool:
-    """Whether two records of geometry are alike; what was solved for is left out."""
+    """Return True if two records of geometry agree; solutions are left out."""
     if isinstance(one, dict) and isinstance(other, dict):
         left_out = {"robot", "boxes", "bound", "sha256", "stacks", "path"}
         return one.keys() - left_out == other.keys() - left_out and all(

@@ -1,4 +1,4 @@
-"""The bound of a certificate: multiples of the equations whose ranks prove as many solutions as are enclosed."""
+"""Root bound of a certificate: multiples of the equations whose ranks prove as many solutions as are enclosed."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def bound(record: dict[str, Any], equations: Sequence[Polynomial], halves: Seque
     if record["kind"] == "pose":
         if poses(equations, halves, record) == count:
             return {"kind": "poses"}
-        raise NotAccepted(f"{count} solutions are enclosed, but there may be more, as far as the checker can tell")
+        raise NotAccepted(f"{count} solutions are enclosed, but the checker cannot exclude more")
     if record["kind"] == "loops":
         loops = [unknowns(((slide, turns) for _, slide, turns in loop), record["angles"]) for loop in record["loops"]]
         for grouping in groupings(record["angles"], record["slides"], loops):
@@ -74,7 +74,7 @@ def _groups(halves: Sequence[bool], most: int) -> Iterator[list[list[Any]]]:
 
 
 def _most(equations: Sequence[Polynomial], halves: Sequence[bool], groups: list[list[Any]]) -> float:
-    """The bound, were all zeros at infinity told that there are modulo the prime; infinite where it is none."""
+    """Return the bound with all zeros at infinity modulo the prime; infinite if there is none."""
     rows, above, edge, every = multiples(equations, halves, groups)
     if not rows:
         return math.inf

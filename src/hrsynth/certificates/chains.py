@@ -1,8 +1,8 @@
 """Platforms that a leg of R and P carries, and single loops of R and P, as the checker's kind ``chain``.
 
-All is told at the goal: there each unknown is zero, and a loop of whatever rational axes closes. Of a loop the last two
-joints have no unknowns: with h₁, h₂ their axes the others have to be, but for a factor, in the span of 1, h₁, h₂ and
-h₂ h₁, which four *normals* annul (M. L. Husty, M. Pfurner and H.-P. Schröcker, Mech. Mach. Theory 42, 2007).
+All is given at the goal: there each unknown is zero, and a loop of whatever rational axes closes. Of a loop the last
+two joints have no unknowns: with h₁, h₂ their axes the others have to be, but for a factor, in the span of 1, h₁, h₂
+and h₂ h₁, which four *normals* annul (M. L. Husty, M. Pfurner and H.-P. Schröcker, Mech. Mach. Theory 42, 2007).
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ STARTS, SETS, ITERATIONS = 64, 20, 60
 REACHED, SAME = 1e-10, 1e-6
 """The last of Newton's steps at a solution, and how far two proposals of one are apart at most."""
 FROM = 0.6
-"""By how much the home of each next joint of a leg is turned from the goal (rad)."""
+"""Rotation of the zero position of each next joint of a leg from the goal (rad)."""
 
 Starts = list[tuple[list[complex], bool | None]]
 
@@ -51,7 +51,7 @@ class ToldChain:
     starts: Starts
     modes: list[int | None]
     home: Array
-    """The coordinates (n,) of the list's at which all of the record is told."""
+    """Coordinates (n,) of the list's own that the record is relative to."""
 
     @classmethod
     def of(cls, record: dict[str, Any], starts: Starts, found: Sequence[Array], home: Array) -> ToldChain:
@@ -103,8 +103,8 @@ def _record(joints: list[Any], n: int, ends: int) -> dict[str, Any]:
 
 
 def _carried_chain(system: CarriedPlatform, found: Sequence[Array]) -> ToldChain:
-    """The conditions of the square part first. Angles are counted from where no joint is at the goal, so that a half
-    turn from there, as directions that are watched allow, is no infinite tangent."""
+    """Sort the conditions of the square part first. Angles are relative to a configuration where no joint is at the
+    goal, so that a half turn from there, as observed directions allow, is not an infinite tangent."""
     n, told, slides = len(system.freedoms_), [*system.square], np.array([each.slides for each in system.freedoms_])
     told += [each for each in system.told if each not in told and _carriers(each)]
     off = np.where(slides, 0.0, FROM * np.arange(1, n + 1))
@@ -125,7 +125,7 @@ def _carried_chain(system: CarriedPlatform, found: Sequence[Array]) -> ToldChain
 
 
 def _carriers(told: CarriedCondition) -> list[int]:
-    """The joints that change what is told."""
+    """Return the joints on which a condition depends."""
     return [k for k in range(told.joints) if k not in told.idle]
 
 

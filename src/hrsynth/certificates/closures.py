@@ -111,8 +111,8 @@ def displacement(mechanism: Mechanism, at: ClosedConfiguration, link: str) -> Ar
 
 
 def _held_measurements(found: AssemblyModes) -> Iterator[list[Any] | None]:
-    """What is measured: a link's directions and points, the link from which they are seen, and how they are seen at the
-    goal; None of another kind."""
+    """Yield the measured values: a link's directions and points, the link from which they are observed, and their
+    values at the goal; None of another kind."""
     setup, at = found.setup, found.goal
     measured = MeasuredRobot.of(setup, found.kind == "real")
     observations, mechanism = measured.observation_model.observations, setup.mechanism

@@ -51,7 +51,7 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
     """The certificate of a list of modes, accepted by the checker; raises ``NoCertificate`` where the list is not
     complete or no bound of the checker proves the count."""
     if found.formation is not None:
-        raise NoCertificate(found.setup.robot.name, "the checker knows no formations")
+        raise NoCertificate(found.setup.robot.name, "the checker does not support formations")
     about = {
         "robot": found.setup.robot.name,
         "kind": found.kind,
@@ -87,7 +87,7 @@ def of_systems(found: SystemModes, about: Mapping[str, Any], robot: ClosedRobot 
     if not found.complete:
         raise NotAccepted("the list is not proved complete")
     if not found.solved:
-        raise NotAccepted("the list is complete by conditions of kinds that the checker does not know")
+        raise NotAccepted("the list is complete by conditions of kinds that the checker does not support")
     proposed = [propose(each, robot) for each in found.solved]
     return _seal(
         [_system(each, robot) for each in proposed],
@@ -140,8 +140,8 @@ def _as_chain(
     reason: NotAccepted,
     *ways: Callable[[MeasuredRobot, ClosedConfiguration, float], tuple[Model, SystemModes]],
 ) -> dict[str, Any]:
-    """Of a mechanism that is a carried platform, or one loop, besides the way in which its modes were listed; raises
-    ``NotAccepted``."""
+    """Return the certificate of a mechanism that is a carried platform, or one loop, besides the method of its list;
+    raises ``NotAccepted``."""
     assert found.model is not None
     for way in ways:
         with suppress(UnsupportedLocus, SystemNotSolved, NotAccepted):
@@ -153,7 +153,7 @@ def _as_chain(
 
 
 def _measured_robot(found: AssemblyModes) -> MeasuredRobot:
-    """What the list holds."""
+    """Return the count of the list."""
     return MeasuredRobot.of(found.setup, found.kind == "real")
 
 
@@ -176,7 +176,7 @@ def _seal(
 
 
 def again(record: dict[str, Any], robot: Mechanism) -> dict[str, Any]:
-    """The certificate of the same question about a robot; raises ``NoCertificate``, and what ``modes`` raises."""
+    """Return the certificate of the same claim about a robot; raises ``NoCertificate``, and what ``modes`` raises."""
     parts: dict[str, Any] = {
         part: tuple(value) if part == "rpy" else value for part, value in record["at"].items() if value is not None
     }
@@ -229,7 +229,7 @@ def _worst_leg(legs: Any, middle: Any) -> int:
     """The leg that misses most at a solution of the square part."""
     off = [max(sum(map(abs, value(p, middle))) for p in leg) for leg in legs]
     if not off or max(off) < RADIUS:
-        raise NotAccepted("a solution that no leg is proved to miss")
+        raise NotAccepted("a solution that is not proved to miss a leg")
     return off.index(max(off))
 
 

@@ -42,7 +42,7 @@ def certificate(found: PathAnswer) -> dict[str, Any]:
     if not found.certified:
         raise NoCertificate(name, found.reason or "no path was proved")
     if not all(o.by_segment for o in found.setup.observed):
-        raise NoCertificate(name, "what is observed is not the direction of a segment")
+        raise NoCertificate(name, "an observation is not the direction of a segment")
     aspects = PathPlanner.of(found.setup)
     assert not isinstance(aspects.pattern, str)
     assert isinstance(aspects.condition, Named)
@@ -140,7 +140,7 @@ def _reduced(rows: Array) -> Array:
 
 
 def again(record: dict[str, Any], robot: Mechanism) -> dict[str, Any]:
-    """The certificate of the same question about a robot."""
+    """Return the certificate of the same claim about a robot."""
     setup = ObservedRobot.of(robot, [link for _, link in record["observed"]])
     ends = [_pose(record[end]) for end in ("start", "goal")]
     return certificate(between_poses(setup, ends, any_mode=bool(record["any_mode"])))
@@ -156,7 +156,7 @@ def _pose(record: dict[str, Any]) -> Pose:
 def _cut(record: dict[str, Any], motion: WrittenMotions, ways: Sequence[StraightSegment], count: int) -> list[Node]:
     """Poses along straight ways, so near to each other that the checker's intervals prove each piece."""
     if not ways or len(ways) < count:
-        raise PathNotAccepted("a leg changes its working mode on the way")
+        raise PathNotAccepted("a leg changes its working mode along the path")
 
     def at(way: StraightSegment, fraction: float, before: Node | None) -> Node:
         p, R = way.at(np.array([fraction]))
@@ -206,7 +206,7 @@ def _leg(limb: ClosedFormLeg) -> dict[str, Any]:
             "aside": write_numbers(float(limb.aside)),
             **found,
         }
-    raise PathNotAccepted("a leg of a kind that the checker does not know")
+    raise PathNotAccepted("a leg of a kind that the checker does not support")
 
 
 def _rule(point: PlatformPoint) -> list[Any]:

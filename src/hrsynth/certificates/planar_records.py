@@ -1,4 +1,4 @@
-"""Loops in a plane as the checker is told them, and about where their closings are."""
+"""Planar loops as the checker reads them, with approximate solutions."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def closings(system: PlanarLoops, count: int) -> ProposedRecord:
     q = [np.array([*np.arctan2(x[n : 2 * n], x[:n]), *x[2 * n :]]) for x in (box.middle.real for box in real)]
     kept = [not is_excluded(system, box) for box in real]
     if sum(kept) + (not system.besides) * (len(boxes) - len(real)) != count:
-        raise NotAccepted("the closings of the loops are not those of the list")
+        raise NotAccepted("the solutions of the loops are not those of the list")
     poses = [
         np.column_stack(
             [

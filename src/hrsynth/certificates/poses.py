@@ -73,7 +73,7 @@ def _coordinates(E: Array, e: Any, g: Any) -> Any:
 
 
 def _split(record: dict[str, Any]) -> dict[str, Any]:
-    """The same with planes and spheres alone, each with a tip of its own."""
+    """Return the system with planes and spheres alone, each with a tip of its own."""
     reaches, tips = [], []
     for tip, reach in zip(record["tips"], record["reaches"], strict=True):
         kind, (c, *rest) = reach_of(reach)
@@ -181,7 +181,7 @@ def _first(record: dict[str, Any], E: Array) -> Any:
 
 
 def _product(a: Any, b: Any) -> Any:
-    """Of quaternions (n, 4)."""
+    """Return the coordinates of quaternions (n, 4)."""
     w = a[:, :1] * b[:, :1] - (a[:, 1:] * b[:, 1:]).sum(axis=1)[:, None]
     return np.hstack([w, a[:, :1] * b[:, 1:] + b[:, :1] * a[:, 1:] + np.cross(a[:, 1:], b[:, 1:])])
 

@@ -1,4 +1,4 @@
-"""What is proposed of a system to the checker: its equations in rational numbers, and about where its solutions are."""
+"""Proposal of a system to the checker: its equations in rational numbers, with approximate solutions."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from ..geometry.vectors import Array
 
 @dataclass(frozen=True, eq=False)
 class ProposedRecord:
-    """A system in rational numbers without boxes and bound; about where its solutions are, and whether they are real
-    (None: too far to be poses); of the real ones the poses (3, 4) as the checker is told them, whether they are modes,
-    and the coordinates of the system in which they were found; its working frame."""
+    """System in rational numbers without boxes and bound; approximate solutions, and whether they are real (None: too
+    far to be poses); for the real ones the poses (3, 4) as the checker reads them, whether they are modes, and the
+    coordinates of the system in which they were found; its working frame."""
 
     record: dict[str, Any]
     starts: Sequence[tuple[Sequence[complex], bool | None]]

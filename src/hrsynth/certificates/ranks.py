@@ -16,12 +16,12 @@ from .verify_ranks import PRIME, digest, verify
 
 
 def certificate(found: Derivation) -> dict[str, Any]:
-    """A: what all joints and loops ask of the joints' rates, X: the platform's twist (of a formation the twists of all
-    bodies), Y: the rates of what is observed, at one random rational instance of the architecture, and the ranks of A,
-    [A; X], [A; Y], [A; Y; X].
+    """A: the constraints of all joints and loops on the joints' rates, X: the platform's twist (of a formation the
+    twists of all bodies), Y: the rates of what is observed, at one random rational instance of the architecture, and
+    the ranks of A, [A; X], [A; Y], [A; Y; X].
 
-    The legs see rank [A; X] + rank [A; Y] − rank [A; Y; X] − rank A of the platform's freedoms. Raises
-    ``NoCertificate`` where there are no instances."""
+    The legs observe rank [A; X] + rank [A; Y] − rank [A; Y; X] − rank A of the platform's dof. Raises
+    ``NoCertificate`` if there are no instances."""
     exact, name = architecture(found.setup), found.robot.name
     try:
         at = exact.instance(0)
@@ -29,7 +29,7 @@ def certificate(found: Derivation) -> dict[str, Any]:
         raise NoCertificate(name, str(reason)) from None
     places = [i for i, o in enumerate(exact.observations) if o.key in {each.key for each in found.setup.observed}]
     if len(places) < len(found.setup.observed):
-        raise NoCertificate(name, "not all that is measured is rational")
+        raise NoCertificate(name, "not all observations are rational")
     matrices = {"A": at.loops, "X": at.rows[0], "Y": np.vstack([at.rows[1 + i] for i in places])}
     whole = {key: [[int(c) for c in row] for row in rows] for key, rows in matrices.items()}
     record = {
@@ -50,17 +50,17 @@ def certificate(found: Derivation) -> dict[str, Any]:
 
 
 def describe_ranks(record: dict[str, Any]) -> str:
-    """What ranks that were proved say of the legs; empty where they are not all there."""
+    """Return the platform dof that proved ranks show; empty if ranks are missing."""
     found = {"".join(sorted(each["of"])): int(each["rank"]) for each in record["stacks"]}
     needed = {"AX", "AXY", "AY"} | ({"A"} if record["matrices"].get("A") else set())
     if not needed <= found.keys():
         return ""
     freedoms = found["AX"] - found.get("A", 0)
-    return f": the legs see {freedoms - found['AXY'] + found['AY']} of {freedoms} freedoms at this instance"
+    return f": the legs observe {freedoms - found['AXY'] + found['AY']} of {freedoms} dof at this instance"
 
 
 def again(record: dict[str, Any], robot: Mechanism) -> dict[str, Any]:
-    """The certificate of the same question about a robot."""
+    """Return the certificate of the same claim about a robot."""
     others = {each.leg for each in robot.observations if not each.by_segment}
     return certificate(derive(robot, [leg if leg in others else link for leg, link in record["observed"]]))
 

@@ -1,4 +1,4 @@
-"""Curves and surfaces as the checker is told them: in rational working coordinates, circles exactly round."""
+"""Curves and surfaces as the checker reads them: in rational working coordinates, circles exactly round."""
 
 from __future__ import annotations
 

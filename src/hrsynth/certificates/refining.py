@@ -17,7 +17,8 @@ STEPS = 7
 GRAIN = 1 << 140
 """Middles of boxes are multiples of one over this."""
 STEEP = 1e10
-"""Condition of the derivatives above which floats do not tell their inverse (the checker asks for a good one alone)."""
+"""Condition number of the derivatives above which floats do not give their inverse (the checker needs a good one
+alone)."""
 
 Polynomial = Mapping[tuple[int, ...], Any]
 

@@ -1,4 +1,4 @@
-"""Systems on poses as the checker is told them, and about where their solutions are."""
+"""Systems on poses as the checker reads them, with approximate solutions."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ def propose(solved: SquareSolution, robot: ClosedRobot | None) -> ProposedRecord
 def _write_system(
     solved: SquareSolution,
 ) -> tuple[dict[str, Any], list[tuple[list[complex], bool | None]], list[Array]]:
-    """A system in rational numbers without boxes and bound; about where its solutions are, and whether they are real;
-    the real ones' poses, as the checker is told them."""
+    """System in rational numbers without boxes and bound; approximate solutions, and whether they are real; the real
+    ones' poses, as the checker reads them."""
     system, part, roots = solved.system, solved.part, solved.roots
     if isinstance(part, PoseSystem):
         return _pose_system(solved)
     if not part.unknowns or part.frame is None:
-        raise NotAccepted("tips at rest leave one pose: there is nothing to enclose")
+        raise NotAccepted("fixed tips leave one pose: there is nothing to enclose")
     frame, turns = part.frame, part.turns(roots.turn)
     values, real = starts_of(roots)
     if isinstance(system, Planar):
@@ -74,7 +74,7 @@ def _write_system(
         record, starts = _write_articulated(system, part, frame, turns, values)
     origin = _middle(part, system) if isinstance(system, Articulated) else frame.origin
     record |= {"kind": "shifting", "square": len(record["reaches"])}
-    if not part.whole:  # then all legs are told, and what is solved first
+    if not part.whole:  # then all legs are used, and what is solved first
         bodies = [0] * len(system.paths) if isinstance(system, Translating) else system.bodies
         paths = [shift_reach(each, frame.origin - origin) for each in system.paths]
         record["reaches"] = [*record["reaches"], *(reach_record(each, frame, 0.0) for each in paths)]
@@ -94,7 +94,7 @@ def _pose_system(solved: SquareSolution) -> tuple[dict[str, Any], list[tuple[lis
     system, part = solved.system, solved.part
     assert isinstance(part, PoseSystem)
     if not part.whole or sum(system.forbids[k] for k in part.legs) != system.freedoms:
-        raise NotAccepted("tips on surfaces, more than needed")
+        raise NotAccepted("tips on surfaces, with redundant observation")
     frame, (values, real) = part.chart.frame, starts_of(solved.roots)
     if isinstance(system, Spatial) and part.chart.study is not None:
         record = {
@@ -108,7 +108,7 @@ def _pose_system(solved: SquareSolution) -> tuple[dict[str, Any], list[tuple[lis
         poses = [placed_in(mode.pose, frame, 3) for mode in solved.modes]
         return *regular(record, list(zip(values, real, strict=True))), poses
     if not isinstance(system, Articulated):
-        raise NotAccepted("tips on surfaces of another platform than the checker knows")
+        raise NotAccepted("tips on surfaces of a platform that the checker does not support")
     turn = TURNS[0]
     record = {
         "kind": "shifting",

@@ -11,10 +11,10 @@
   forms would have a zero, and isolated ones be fewer (Bernstein, Funct. Anal. Appl. 9, 1975, Theorem B).
 * At most, *poses*: conditions *on a sphere*, *on a plane* on points of a rigid body are linear in 17 coordinates in
   which poses have dimension 6 and degree 40 (Gallet, Nawratil, Schicho, J. Geom. 106, 2015): of six at most 40 zeros,
-  at infinity too, and no curve besides 40. A tip at rest, or six planes, leave three quadrics: 8; rods in a ball: 16.
-* A real pose puts each tip where its box does, to the distance told. With more legs, or loops, than needed, others miss
-  one, poses fit to 1e-9. Systems (branches of legs) are counted one by one. The robot *closes* where places of its
-  links are told: its joints fit, tips are in place, and what is measured is as told once for all poses.
+  at infinity too, and no curve besides 40. A fixed tip, or six planes, leave three quadrics: 8; rods in a ball: 16.
+* A real pose puts each tip where its box does, to the given distance. With more legs, or loops, than needed, others
+  miss one, poses fit to 1e-9. Systems (leg solutions) are counted one by one. The robot *closes* where poses of its
+  links are given: its joints fit, tips are in place, and measured values are those given once for all poses.
 """
 
 import hashlib
@@ -28,7 +28,7 @@ PRIME, FIT, WITHIN, FAR, TERMS, LENGTH = 2147483647, Fraction(1, 10**9), Fractio
 
 
 class NotAccepted(Exception):
-    """Why a certificate is not accepted."""
+    """Certificate that is not accepted: the reason."""
 
 
 def need(true, why):
@@ -177,7 +177,7 @@ def spatial(system, tips):
 
 def loops(system, tips):
     """Links in the plane z = 0 that turn by whole multiples of angles: sums of their vectors vanish, some along slides.
-    Unknowns: cosines, sines, slides. Of each tip's link it is told how it turns and shifts; also points of others."""
+    Unknowns: cosines, sines, slides. Each tip's link has its turns and shifts; also points of others."""
     a, n = system["angles"], 2 * system["angles"] + system["slides"]
 
     def turned(vector, slide, turns):  # times cos + i sin of each angle so often, and a slide where it is not -1
@@ -265,7 +265,7 @@ def pose(system, tips):
 def chain(system, tips):
     """Turns and slides from the base on: dual quaternions 1 + t h, h = a + eps o x a or eps a / 2. Three tips are the
     platform's, behind the first of ``ends``; others are points, or arrows, that some joints carry. ``normals`` are
-    all that annul what the rest of a loop, without unknowns, can be, about at right angles to each other."""
+    all that annul what the other part of a loop, without unknowns, can be, about at right angles to each other."""
     n, joints, ((last,), *ends) = system["unknowns"], [(k, *rational(v)) for k, *v in system["joints"]], system["ends"]
     t, halves, annul = [term(1, n, k) for k in range(n)], [j[0] == "R" for j in joints[:n]], rational(system["normals"])
 
@@ -291,10 +291,16 @@ def chain(system, tips):
     off = [u for u, v in combinations(annul, 2) if 64 * dot(u, v) ** 2 > dot(u, u) * dot(v, v)] + [
         v for v in annul for x in rest if dot(v, x)
     ]
-    need((len(joints) == n and not annul) or (not off and modular(all_, 0)[1] == 8), "normals of what the rest can be")
+    need(
+        (len(joints) == n and not annul) or (not off and modular(all_, 0)[1] == 8),
+        "normals of the other part of a loop",
+    )
     rows = [(add(*map(times, v, [*carried(0, t)[0], *carried(0, t)[1]])), v, {(*map(int, halves),): 1}) for v in annul]
     for b, (start, end, arrow), reach in zip(tips[3:], ends, map(reach_of, system["reaches"]), strict=True):
-        need(0 <= start < end <= n and reach[0] in ("plane", "sphere")[: 2 - bool(arrow)], "what a tip is told of")
+        need(
+            0 <= start < end <= n and reach[0] in ("plane", "sphere")[: 2 - bool(arrow)],
+            "the joints and locus of a tip",
+        )
         turn, point = placed(*carried(start, t[start:end]), b)
         rows += [(*each, point[2]) for each in conditions((turn, {}, point[2]) if arrow else point, reach)]
     points = [placed(*carried(0, by), b)[1] for by, b in zip([t[:last]] * 3 + [t], tips[:3] + tips[:1])]
@@ -459,7 +465,7 @@ def modes(record):
         for each in system["boxes"]:
             m, r = rational(each["middle"]), rational(each["radius"])
             need(len(m) == len(halves) and all(len(z) == 2 for z in m), "a box without its unknowns")
-            one = "misses" if "misses" in each else "pose within links"  # what a box says, and nothing else
+            one = "misses" if "misses" in each else "pose within links"  # the keys of a box, and no other
             need(each.keys() <= {*f"middle radius inverse {one}".split()}, "another key of a box")
             boxes, proofs = [*boxes, (m, r)], [*proofs, (flat, m, r, rational(each["inverse"]))]
             finite = all(least(w, m, r) > 0 for _, _, w in points)
@@ -523,7 +529,7 @@ def turn_of(P):  # the rotation of a pose
     return turn
 
 
-def closes(robot, links):  # its joints fit to 1e-9 with links displaced since zero, and what is held is as told
+def closes(robot, links):  # its joints fit to 1e-9 with links displaced since zero, and fixed values are those given
     D, off = {name: rational(rows) for name, rows in links.items()}, []
     turns = {name: turn_of(rows) for name, rows in D.items()}
     for kind, one, other, *vectors in robot["joints"]:  # the point, then axes

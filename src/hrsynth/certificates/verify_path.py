@@ -34,7 +34,7 @@ Vector = list[Interval]
 
 
 class PathNotAccepted(Exception):
-    """Why a certificate is not accepted."""
+    """Certificate that is not accepted: the reason."""
 
 
 def need(true: Any, why: str) -> None:
@@ -259,7 +259,7 @@ def place(motion: Any, one: Any, other: Any) -> tuple[Vector, Vector]:  # p and 
 
 
 def path(record: Any) -> str:
-    need("motion" in record, "it does not say which motions the platform has")
+    need("motion" in record, "the motions of the platform are missing")
     motion, modes = record["motion"], record["modes"]
     nodes = [node(each, motion) for each in record["path"]]
     need(record["verdict"] in ("same aspect", "separated") and len(nodes) > 1, "another verdict, or too few poses")

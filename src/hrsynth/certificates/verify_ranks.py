@@ -1,7 +1,7 @@
 """Check a certificate of ranks: `python verify_ranks.py c.json`. Integers only.
 
-A stack of integer matrices has the rank told: a minor of it is not zero modulo a prime, and as many independent vectors
-as it has columns besides are annulled by it.
+A stack of integer matrices has the given rank: a minor of it is not zero modulo a prime, and as many independent
+vectors as it has columns besides are annulled by it.
 """
 
 import hashlib
@@ -12,7 +12,7 @@ PRIME, LENGTH, MOST = 2147483647, 5_000_000, 300  # of a file; of rows and colum
 
 
 class RanksNotAccepted(Exception):
-    """Why a certificate is not accepted."""
+    """Certificate that is not accepted: the reason."""
 
 
 def need(true, why):

@@ -1,7 +1,7 @@
 """Legs in closed form: the tip, a point of the platform, decides what the leg does, and whether it reaches at all.
 
 A leg carries one thing that its tip C decides: the end B of a crank or of a slider, from which a rod leads to C, or the
-direction of a rod that slides. Two solutions are told apart by ``mode`` ±1, the working mode. The *reach margin* is
+direction of a rod that slides. ``mode`` ±1, the working mode, selects one of two solutions. The *reach margin* is
 positive as long as the leg reaches its tip, and vanishes where the two solutions meet (Type 1). Points in base axes.
 
 The formulas are on components: numbers, arrays, balls, or symbols of a tape. A method ``at`` makes components of the
@@ -66,13 +66,13 @@ def sliding_rod(D: Components, axis: Components | None, aside: Any, mode: Any) -
 
 @dataclass(frozen=True, eq=False)
 class ClosedFormLeg:
-    """A leg's way from the base to a tip."""
+    """Leg's path from the base to a tip."""
 
     label: str
     tip: PlatformPoint = ORIGIN
     mode: float = 1.0
     fitted: bool = field(default=False, kw_only=True)
-    """Whether the leg's form or its tip was found by fitting samples, not read from its joints."""
+    """True if the leg's form or its tip was found by fitting samples, not read from its joints."""
     sense: float = field(default=1.0, kw_only=True)
     """±1: the observed direction is this times that of the rod, from B to the tip."""
     crank: str = field(default="", kw_only=True)
@@ -194,7 +194,8 @@ class PlatformDirection(ClosedFormLeg):
     radius: float = field(default=0.0, kw_only=True)
 
     def at(self, tip: Components, number: Number, mode: Any, *u: Any) -> tuple[Any, list[Any]]:
-        """Of the line of u: reach margin and the crank's end B on it, |B − centre| = radius (sphere and line)."""
+        """Return, for the line of u, the reach margin and the crank's end B on it, |B − centre| = radius (sphere and
+        line)."""
         centre, radius = number(self.centre), number(self.radius)
         D = minus(tip, centre)
         away = dot(D, u)

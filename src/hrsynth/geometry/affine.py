@@ -5,8 +5,8 @@ Figueiredo, Self-Validated Numerical Methods, 1997). Every rounding of the float
 are met count as a geometry's numbers, known to ``tolerances.CHAIN_ROUNDING`` except 0 and ±1; single numbers count as
 exact.
 
-What becomes of sums of slopes and of radii is said once, in functions of numbers: of arrays here, of one box after the
-other where :mod:`..batch.box_machine` has them compiled.
+The arithmetic of sums of slopes and of radii is written once, in functions of numbers: of arrays here, of one box after
+the other where :mod:`..batch.box_machine` has them compiled.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ class AffineForms:
 
     @property
     def spread(self) -> Array:
-        """How far a value can be from the centre v[0], an upper bound (…)."""
+        """Upper bound (…) of the distance of a value from the centre v[0]."""
         return spread(np.abs(self.v[1:]).sum(axis=0), self.r)
 
     @property
     def size(self) -> Array:
-        """An upper bound of |value| (…)."""
+        """Upper bound of |value| (…)."""
         return (np.abs(self.v).sum(axis=0) + self.r) * (1 + AFFINE_ROUNDING)
 
     def __getitem__(self, index: Any) -> AffineForms:
@@ -123,11 +123,11 @@ class AffineForms:
         return AffineForms(v, line_radius(self.r, slope, off, size, np.abs(v).sum(axis=0)))
 
     def padded(self, count: int) -> AffineForms:
-        """The same with more symbols, on which it does not depend."""
+        """Return the forms with more symbols, on which they do not depend."""
         return AffineForms(np.concatenate([self.v, np.zeros((count - len(self.v), *self.r.shape))]), self.r)
 
     def transposed(self) -> AffineForms:
-        """The same with the last two dimensions in turn."""
+        """Return the forms with the last two dimensions transposed."""
         return AffineForms(np.swapaxes(self.v, -1, -2), np.swapaxes(self.r, -1, -2))
 
     def sum(self, axis: int = -1) -> AffineForms:
@@ -203,7 +203,7 @@ def _add_rounding(v: Array, r: Array, size: Array) -> AffineForms:
 
 
 def _doubt(k: Array) -> Array:
-    """How far a geometry's numbers may be from what is meant."""
+    """Error of a geometry's numbers."""
     size = np.abs(k)
     return np.where((size == 0) | (size == 1), 0.0, CHAIN_ROUNDING * (1 + size))
 
@@ -214,7 +214,7 @@ def rounded_radius(r: Numbers, size: Numbers) -> Numbers:
 
 
 def spread(slopes: Numbers, r: Numbers) -> Numbers:
-    """How far a value can be from its centre: the sum of its ``slopes``' sizes and its radius."""
+    """Return the largest distance of a value from its centre: the sum of its ``slopes``' sizes and its radius."""
     return (slopes + r) * (1 + AFFINE_ROUNDING)
 
 
@@ -244,8 +244,8 @@ def inverse_line(centre: Numbers, width: Numbers) -> tuple[Numbers, Numbers, Num
 
 
 def root_line(centre: Numbers, width: Numbers) -> tuple[Numbers, Numbers, Numbers, Numbers]:
-    """The same of √value, of those values that are not negative: on [a, b] it lies between its secant and the tangent
-    of the same slope 1 / (√a + √b). No numbers where all are negative."""
+    """Return slope, shift, error and size of a line near √value, of those values that are not negative: on [a, b] it is
+    between its secant and the tangent of the same slope 1 / (√a + √b). No numbers where all are negative."""
     off = AFFINE_ROUNDING * abs(centre)
     a, b = np.sqrt(np.maximum(centre - width - off, 0.0)), np.sqrt(centre + width + off)
     both = a + b

@@ -64,14 +64,14 @@ def widen(v: Field, radius: float) -> Field:
 
 
 def above_zero(v: Field) -> NDArray[np.bool_]:
-    """Where a number, or every number in a ball, is positive (never where it is no number)."""
+    """Return True where a number, or every number in a ball, is positive (never where it is not a number)."""
     if v.dtype != object:
         return np.asarray(v > 0)
     return np.array([bool(x > 0) for x in v.flat], dtype=bool).reshape(v.shape)
 
 
 def finite(v: Field) -> NDArray[np.bool_]:
-    """Where a ball is bounded (formulas on it had no pole in it)."""
+    """Return True where a ball is bounded (formulas on it had no pole in it)."""
     return np.array([getattr(x, "is_finite", lambda: True)() for x in v], dtype=bool)
 
 

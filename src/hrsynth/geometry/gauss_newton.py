@@ -45,10 +45,10 @@ def descend(
     iterations: int,
     content: Callable[[Residual], bool],
 ) -> tuple[X, Residual]:
-    """Where steps lead that make the error smaller, and what is left of it there.
+    """Return the last point of steps that make the error smaller, and the error there.
 
-    ``evaluate`` gives the error and its Jacobian at a place, ``advance`` where a step with a damping factor leads (or
-    None), ``content`` tells whether that is enough.
+    ``evaluate`` gives the error and its Jacobian at a point, ``advance`` the next point by a step with a damping factor
+    (or None), ``content`` returns True if the error is small enough.
     """
     return next(
         descend_together(

@@ -30,8 +30,7 @@ class Incidence:
 
 
 class Sieve:
-    """Tells relations that hold from those that do not, at the first configuration (zero) and at all others, and
-    remembers how clear that was."""
+    """Test of relations: which are true at the first configuration (zero) and at all others, and how clearly."""
 
     def __init__(self) -> None:
         self.accepted, self.rejected = 0.0, float("inf")
@@ -83,7 +82,7 @@ def incidences(
 ) -> list[Incidence]:
     """All incidences of ``points`` (n, configurations, 3) towards ``classes`` of directions (m, configurations, 3).
 
-    ``together`` (n, n) says which points keep their direction from each other; ``owns`` are the classes of the axes
+    ``together`` (n, n) marks the points that keep their direction from each other; ``owns`` are the classes of the axes
     through each point, ``slides`` those along which it may be moved without consequence.
     """
 

@@ -1,4 +1,4 @@
-"""Lines in space: feet, common perpendiculars, meeting points. Points (3,), unit directions (3,), metres."""
+"""Lines in space: perpendiculars and intersections. Points (3,), unit directions (3,), metres."""
 
 from __future__ import annotations
 
@@ -9,27 +9,28 @@ from .vectors import Array, cross
 
 
 def parallel(a: Array, b: Array) -> bool:
-    """Whether two unit vectors are parallel (of either sense)."""
+    """Return True if two unit vectors are parallel (of either sense)."""
     return bool(np.linalg.norm(cross(a, b)) < SAME_DIRECTION)
 
 
 def perpendicular(a: Array, b: Array) -> bool:
-    """Whether two unit vectors are perpendicular."""
+    """Return True if two unit vectors are perpendicular."""
     return bool(abs(float(a @ b)) < SAME_DIRECTION)
 
 
 def foot(point: Array, on: Array, along: Array) -> Array:
-    """The foot of the perpendicular from ``point`` to the line through ``on`` with direction ``along``."""
+    """Return the point nearest to ``point`` on the line through ``on`` with direction ``along``."""
     return on + along * float(along @ (point - on))
 
 
 def distance(point: Array, on: Array, along: Array) -> float:
-    """The distance of ``point`` from the line through ``on`` with direction ``along``."""
+    """Return the distance of ``point`` from the line through ``on`` with direction ``along``."""
     return float(np.linalg.norm(point - foot(point, on, along)))
 
 
 def common_perpendicular(p: Array, a: Array, q: Array, b: Array) -> tuple[Array, Array]:
-    """The feet, on the lines (p, a) and (q, b), of their common perpendicular (parallel lines: the one through p)."""
+    """Return the points, on the lines (p, a) and (q, b), of their common perpendicular (parallel lines: the one through
+    p)."""
     if parallel(a, b):
         return p, foot(p, q, b)
     cosine = float(a @ b)

@@ -37,5 +37,6 @@ def translation(direction: Numbers) -> Numbers:
 
 
 def point_velocity(V: Array, arm: Array) -> Array:
-    """v + ω × r, (3, n): the velocities of the point at ``arm`` (3,) from where twists V (6, n) are told."""
+    """Return v + ω × r, (3, n): the velocities of the point at ``arm`` (3,) from the reference point of twists V (6,
+    n)."""
     return V[:3] - hat(arm) @ V[3:]

@@ -40,7 +40,7 @@ def unit(vector: ArrayLike) -> Array:
 
 
 def orient_axis(axis: Array) -> Array:
-    """An axis (3,) in the one sense in which axes are told: its largest component positive, of equal ones the first."""
+    """Return an axis (3,) in its canonical sense: its largest component positive, of equal ones the first."""
     sizes = np.abs(axis)
     return axis if axis[np.argmax(sizes > (1 - NAMED) * sizes.max())] >= 0 else -axis
 
@@ -128,8 +128,8 @@ def inverse(X_AB: Array) -> Array:
 
 
 def pose_difference(X: Array, other: Array, length: float, point: Array | None = None) -> float:
-    """How far two poses (4, 4) are apart: the larger of the shift (in lengths) and the difference of the rotations,
-    each by its largest entry; of a ``point`` (3,) of the body, where it is given, the shift alone."""
+    """Return the difference of two poses (4, 4): the larger of the shift (in lengths) and the difference of the
+    rotations, each by its largest entry; of a ``point`` (3,) of the body, if it is given, the shift alone."""
     if point is not None:
         return float(np.max(np.abs(transform(X, point) - transform(other, point)))) / length
     gap = np.abs(X - other)

@@ -1,1 +1,1 @@
-"""The Pinocchio twin, closed configurations, the relation between platform and observation, the certificate."""
+"""Pinocchio model, closed configurations, velocity relation of platform and observations, equivalence check."""

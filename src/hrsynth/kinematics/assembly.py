@@ -1,7 +1,7 @@
-"""A robot assembled at a given pose of its platform's bodies, leg by leg: does every leg close there?
+"""Assembly of a robot at a given pose of its platform's links, leg by leg.
 
-That it does is shown by a configuration; that it does not, or only beyond a joint's limits, is said where the list of a
-leg's closures proves it (:mod:`closures`). Starts from which nothing closes prove nothing.
+A configuration shows that it closes. That it does not, or only beyond a joint's limits, is reported only if the list of
+a leg's solutions proves it (:mod:`.leg_solutions`). Starts from which nothing closes prove nothing.
 """
 
 from __future__ import annotations
@@ -29,20 +29,20 @@ from .pinocchio_model import PinocchioModel
 from .tasks import LinkPoses, PoseAndValuesTask, solve
 
 STARTS = 24
-"""Configurations of a leg, the zero configuration first, from which it is closed at a pose: for each of its listed
-closures, and as many without a list."""
+"""Number of configurations of a leg, the zero configuration first, from which it is closed at a pose: for each of its
+listed solutions, and as many without a list."""
 
 ASSEMBLED, BEYOND, IMPOSSIBLE, NOT_FOUND = "yes", "beyond limits", "no", "not found"
-"""Whether a robot can be assembled: a configuration is at hand; only beyond joints' limits, and it cannot, both proved;
+"""Verdicts on the assembly of a robot: a configuration is known; only beyond joint limits, and not at all, both proved;
 none of these."""
 
 
 @dataclass(frozen=True, eq=False)
 class Assembly:
-    """What became of a robot at a pose: the configuration, or None and the legs that were not closed (``open``), with
-    what proves of legs that they cannot be (``misses``); joints that are outside their limits there (``beyond``), and
-    whether all closures of a leg, or of the platform, are (``held``); the poses (4, 4) of the platform's links;
-    couplings that were not closed where all legs are (``gears``)."""
+    """Assembly of a robot at a pose: the configuration, or None and the legs that were not closed (``open``), with
+    proofs that legs cannot close (``misses``); joints beyond their limits there (``beyond``), and whether all solutions
+    of a leg, or of the platform, are (``held``); the poses (4, 4) of the platform's links; couplings that were not
+    closed where all legs are (``gears``)."""
 
     configuration: ClosedConfiguration | None
     open: tuple[str, ...] = ()
@@ -65,13 +65,13 @@ class Assembly:
 
     @property
     def reachable(self) -> bool | None:
-        """Whether the whole robot closes, within the limits of its joints; None where neither was found."""
+        """True if the whole robot closes within its joint limits; None if neither was found."""
         return {ASSEMBLED: True, NOT_FOUND: None}.get(self.verdict, False)
 
 
 @dataclass(frozen=True, eq=False)
 class Assembler:
-    """A robot whose legs are closed one at a time between the base and bodies of the platform at given poses."""
+    """Robot whose legs are closed one at a time between the base and links of the platform at given poses."""
 
     decomposition: LegDecomposition
     length: float
@@ -85,7 +85,7 @@ class Assembler:
 
     @cached_property
     def _platform(self) -> Mechanism:
-        """The platform alone, floating with the first body on which a leg ends."""
+        """Platform alone, floating with the first link on which a leg ends."""
         mechanism, body = self.decomposition.mechanism, self.decomposition.legs[0].platform_link
         kept = {mechanism.base, *self.decomposition.platform}
         floats = Joint(
@@ -102,15 +102,15 @@ class Assembler:
         )
 
     def platform(self, bodies: Mapping[str, Array]) -> dict[str, Array]:
-        """The poses (4, 4) of all links of the platform where the bodies on which legs end have these; raises
-        ``LoopsNotClosed`` where its own joints do not allow that."""
+        """Return the poses (4, 4) of all links of the platform where the links on which legs end have these; raises
+        ``LoopsNotClosed`` if its own joints do not allow that."""
         return self._platform_at(bodies)[0]
 
     def _platform_at(
         self, bodies: Mapping[str, Array], within: float = 0.0
     ) -> tuple[dict[str, Array], list[str], bool]:
-        """The same with its joints that are beyond their limits there, and whether one is that has no other
-        value where the bodies are, which is known to ``within``."""
+        """Return the assembly with its joints that are beyond their limits, and whether one of them has no other value
+        at these poses of the links, which are known to ``within``."""
         mechanism, body = self._platform, self.decomposition.legs[0].platform_link
         displacement = bodies[body] @ inverse(mechanism.links[body].pose)
         poses = {link: displacement @ mechanism.links[link].pose for link in self.decomposition.platform}
@@ -135,8 +135,8 @@ class Assembler:
     def at(
         self, bodies: Mapping[str, Array], measured: Sequence[tuple[Observation, Array]], within: float = 0.0
     ) -> Assembly:
-        """The robot with the bodies (on which legs end) at these poses (4, 4), known to ``within`` (characteristic
-        lengths, radians), and the measured values as given."""
+        """Assemble the robot with the links (on which legs end) at these poses (4, 4), known to ``within``
+        (characteristic lengths, radians), and the measured values as given."""
         platform, beyond, held = self._platform_at(bodies, within)
         poses = dict(platform)
         missing, misses = list[str](), list[tuple[str, ReachFailure]]()
@@ -155,7 +155,7 @@ class Assembler:
             return Assembly(None, tuple(missing), (), platform, tuple(misses))
         mechanism = self.decomposition.mechanism
         poses[mechanism.base] = mechanism.links[mechanism.base].pose
-        while len(poses) < len(mechanism.links):  # what hangs on no leg, as fingers do, is carried along
+        while len(poses) < len(mechanism.links):  # links that are in no leg, as fingers, are carried along
             carrier, link = next(
                 (one, other)
                 for joint in mechanism.joints.values()
@@ -167,7 +167,7 @@ class Assembler:
         return Assembly(ClosedConfiguration.of(whole, whole.q0), (), tuple(beyond), platform, (), held)
 
     def _leg(self, leg: Leg, X: Array, measured: Sequence[tuple[Observation, Array]], within: float) -> _Closing:
-        """One leg with its end at X: within its joints' limits where it was found there."""
+        """Close one leg with its end at X: within its joint limits if it is found there."""
         model = self._twins[leg.label]
         target = PoseAndValuesTask(leg.platform_link, X, self.decomposition.point, self.reference, tuple(measured))
         first = self._close(model, model.q0, target)
@@ -190,14 +190,14 @@ class Assembler:
         return _Closing(None if first is None else (model, first), None, held)
 
     def _close(self, model: PinocchioModel, start: Array, target: PoseAndValuesTask) -> Array | None:
-        """The closed configuration that a start leads to."""
+        """Return the closed configuration that a start leads to."""
         q, residual = solve(model, start, target, tolerance=SOLVED, iterations=LEG_ITERATIONS)
         turned = target.point is not None or _turned_as(model.pose(q, target.link), target.pose)
         return q if residual <= CLOSED and turned else None
 
 
 def of_links(model: PinocchioModel, pose: Callable[[str], Array]) -> ClosedConfiguration:
-    """The configuration of a twin at which its links have their poses (4, 4); raises ``LoopsNotClosed``."""
+    """Return the configuration of a model at which its links have their poses (4, 4); raises ``LoopsNotClosed``."""
     poses = {link: pose(link) for link in model.mechanism.links}
     q, residual = solve(model, model.read(poses.__getitem__), tolerance=SOLVED)
     if residual > CLOSED or not all(_turned_as(model.pose(q, link), X) for link, X in poses.items()):
@@ -207,8 +207,8 @@ def of_links(model: PinocchioModel, pose: Callable[[str], Array]) -> ClosedConfi
 
 @dataclass(frozen=True, eq=False)
 class _Closing:
-    """A leg at a pose: its closed configuration (twin, q), or what proves that there is none, or neither; whether all
-    its closures are beyond limits."""
+    """Leg at a pose: its closed configuration (model, q), or the proof that there is none, or neither; whether all its
+    solutions are beyond limits."""
 
     found: tuple[PinocchioModel, Array] | None
     miss: ReachFailure | None = None
@@ -216,13 +216,13 @@ class _Closing:
 
 
 def _turned_as(X: Array, wanted: Array) -> bool:
-    """Whether two poses are turned alike: the solver's error of a turn vanishes at half a turn as well."""
+    """Return True if two poses have one rotation: the solver's error of a rotation vanishes at half a turn as well."""
     return float(np.trace(X[:3, :3].T @ wanted[:3, :3])) > 1.0
 
 
 def _starts(model: PinocchioModel, known: LegSolutions = UNDECIDED) -> Iterator[Array]:
-    """Configurations with the joints' values that are known, other joints as at zero, then at random, always the same;
-    last without values."""
+    """Yield configurations with the joints' known values, other joints as at zero, then random, always the same; last
+    without values."""
     rng = np.random.default_rng(0)
     joints = [model.coordinates[joint] for joint, _ in known.values if joint in model.coordinates]
     lists = [

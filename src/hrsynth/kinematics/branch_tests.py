@@ -1,9 +1,8 @@
-"""Branches and operation modes of a configuration space: whether a step stays on its branch, and what tells one mode
-from another.
+"""Tests of steps along a branch, and signatures that distinguish operation modes.
 
 Components of the configuration space meet where the loops lose rank, and the smallest singular values fall there in
-proportion to the distance. So a step counts as following where, along it and along its correction, mobility, tangent
-space and all singular values of the loops agree: then it is short beside the distance to the next such place. This is
+proportion to the distance. So a step stays on its branch if, along it and along its correction, mobility, tangent space
+and all singular values of the loops agree: then it is short compared with the distance to the next such point. This is
 measured at four points, not proved between them. Source: docs/pages/theory.md, section 5.
 """
 
@@ -27,17 +26,17 @@ TURNED = 0.3
 CHANGED = 1.5
 """Largest ratio between the loops' singular values, in order, at the start of a step and along it."""
 CORRECTED = 0.2
-"""Longest correction, as part of the step: what ``TURNED`` lets a smooth branch bend away, with a margin."""
+"""Longest correction, as part of the step: the bend of a smooth branch that ``TURNED`` allows, with a margin."""
 EVENLY = 0.2
-"""Part of the weakest singular value by which its fall to a singularity may depart from an even one."""
+"""Part of the smallest singular value by which its fall to a singularity may differ from a linear one."""
 LARGEST_WHOLE = 4
 """Number of observations up to which all sets of them are compared; beyond, single ones, pairs and all."""
 
 
 def follows(here: ClosedConfiguration, step: Array, there: ClosedConfiguration) -> bool:
-    """Whether ``there``, which the tangent ``step`` (nv,) from ``here`` was corrected to, lies beside ``here`` on its
-    branch: same mobility, tangent spaces close, no sheet beside it, singular values alike half way, at the step's end
-    and there."""
+    """Return True if ``there``, to which the tangent ``step`` (nv,) from ``here`` was corrected, is near ``here`` on
+    its branch: same mobility, tangent spaces close, no sheet beside it, singular values alike half way, at the step's
+    end and there."""
     kept = here.strengths
     if len(there.strengths) != len(kept):
         return False
@@ -52,23 +51,23 @@ def follows(here: ClosedConfiguration, step: Array, there: ClosedConfiguration) 
 
 
 def alike_along(here: ClosedConfiguration, step: Array) -> bool:
-    """Whether the loops' singular values half way along a step and at its end are like those ``here``."""
+    """Return True if the loops' singular values half way along a step and at its end are like those ``here``."""
     return not len(here.strengths) or all(alike_after(here, part * step) for part in (0.5, 1.0))
 
 
 def turned_little(A: Array, B: Array) -> bool:
-    """Whether the largest principal angle is at most ``TURNED``: its sine is at most the Frobenius norm of what lies
-    outside."""
+    """Return True if the largest principal angle is at most ``TURNED``: its sine is at most the Frobenius norm of the
+    outer part."""
     if A.shape == B.shape and np.linalg.norm(B - A @ (A.T @ B)) < (1 - BOUNDED) * np.sin(TURNED):
         return True
     return largest_angle(A, B) <= TURNED
 
 
 def alike_after(here: ClosedConfiguration, step: Array) -> bool:
-    """Whether the loops' singular values after a step are like those ``here``.
+    """Return True if the loops' singular values after a step are like those ``here``.
 
     With J = U S Vᵀ here, J' there, A = S⁻¹ Uᵀ J' and δ = ‖A Aᵀ − 1‖: σ'² of Uᵀ J' lies in (1 ± δ) σ², and that of J'
-    exceeds it by no more than ‖J' − U Uᵀ J'‖². Only where these bounds do not decide are they taken apart.
+    exceeds it by no more than ‖J' − U Uᵀ J'‖². Singular values are computed only if these bounds do not decide.
     """
     kept, U = here.strengths, here.loops.left
     J = here.model.jacobian(here.model.integrate(here.q, step))
@@ -84,8 +83,8 @@ def alike_after(here: ClosedConfiguration, step: Array) -> bool:
 
 
 def nears(here: ClosedConfiguration, step: Array, there: ClosedConfiguration) -> bool:
-    """As :func:`follows` for the end of a way, which may be a singularity or near one: the weakest singular value may
-    fall to zero, evenly and without a change of its sign, while all others stay alike."""
+    """Return True if a step passes :func:`follows` at the end of a path, which may be a singularity or near one: the
+    smallest singular value may fall to zero, linearly and without a change of its sign, while all others stay alike."""
     kept, ahead = here.strengths, there.strengths
     others = len(kept) - 1
     if not others <= len(ahead) <= len(kept):
@@ -106,8 +105,8 @@ def nears(here: ClosedConfiguration, step: Array, there: ClosedConfiguration) ->
 
 
 def _same_side(here: ClosedConfiguration, there: ClosedConfiguration) -> bool:
-    """Whether the determinant of the loops, in the bases of their range and corange at ``here``, keeps its sign: two
-    sheets of the configuration space beside each other have opposite ones (for y (y − d) = 0, ∓d)."""
+    """Return True if the determinant of the loops, in the bases of their range and corange at ``here``, keeps its sign:
+    two sheets of the configuration space beside each other have opposite ones (for y (y − d) = 0, ∓d)."""
     across = here.loops.left.T @ there.model.jacobian(there.q) @ here.loops.right
     return bool(np.linalg.slogdet(across)[0] > 0)
 
@@ -122,8 +121,8 @@ def _alike(one: Array, other: Array) -> bool:
 
 
 def turns_of(found: VelocityRelation) -> tuple[int, int, int]:
-    """The rank of the angular velocities of the platform (of a formation: of all bodies), and the least and the most
-    that may be said to be: singular values above the cutoff, those that surely count, and all but those that surely do
+    """Return the rank of the angular velocities of the platform (of a formation: of all links), and its least and
+    largest possible value: singular values above the cutoff, those that surely count, and all but those that surely do
     not."""
     freedoms = found.dof.value
     values = (
@@ -137,11 +136,11 @@ def turns_of(found: VelocityRelation) -> tuple[int, int, int]:
 
 @dataclass(frozen=True)
 class Signature:
-    """What is the same at all generic configurations of one operation mode.
+    """Signature of an operation mode: the same at all its generic configurations.
 
-    ``turns`` is the rank of the platform's angular velocities, ``turning`` the least and the most, as of
-    :func:`turns_of`. ``seen`` holds, for each of :func:`sets_of` the observations, the least and the most freedoms that
-    they may be said to see, between singular values that surely count and those that surely do not.
+    ``turns`` is the rank of the platform's angular velocities, ``turning`` its least and largest value, as of
+    :func:`turns_of`. ``seen`` has, for each of :func:`sets_of` the observations, the least and largest number of
+    platform dof that they may observe, between singular values that surely count and those that surely do not.
     """
 
     mobility: int
@@ -159,7 +158,7 @@ class Signature:
         rates = found.rates * chosen[:, :, None]
         twists = np.broadcast_to(found.twist_part, (len(chosen), *found.twist_part.shape))
         lost = [singular_values(each) for each in (np.concatenate([twists, rates], axis=1), rates)]
-        # a set S sees dof − (rank [X; Y_S] − rank Y_S) of the platform's freedoms
+        # a set S observes dof − (rank [X; Y_S] − rank Y_S) of the platform's dof
         together, alone = (
             [np.sum(values > zero, axis=1) for zero in (SURELY_SOMETHING, SURELY_ZERO)] for values in lost
         )
@@ -175,7 +174,7 @@ class Signature:
         )
 
     def agrees(self, other: Signature) -> bool:
-        """Whether both can be of one operation mode."""
+        """Return True if both can be of one operation mode."""
         same = (self.mobility, self.dimension, self.dof) == (other.mobility, other.dimension, other.dof)
         return same and all(
             a[0] <= b[1] and b[0] <= a[1]
@@ -186,19 +185,19 @@ class Signature:
     def motion(self) -> str:
         """Translations and other motions of the platform: 3T, 2T1R, 1T2R, 3T3R …"""
         parts = ((self.dof - self.turns, "T"), (self.turns, "R"))
-        return "".join(f"{count}{letter}" for count, letter in parts if count) or "at rest"
+        return "".join(f"{count}{letter}" for count, letter in parts if count) or "fixed"
 
 
 @dataclass(frozen=True, eq=False)
 class OperationMode:
-    """An operation mode that was met: its signature, and one of its configurations."""
+    """Operation mode that was found: its signature, and one of its configurations."""
 
     signature: Signature
     at: ClosedConfiguration
 
     def beside(self, other: Signature, labels: Sequence[str]) -> str:
-        """What the platform does in this mode, and what legs (``labels``, by observation) see there and not in the
-        mode of ``other``, or the other way round."""
+        """Return the platform's motion in this mode, and the number of dof that legs (``labels``, by observation)
+        observe there and not in the mode of ``other``, or the other way round."""
         own, sets = self.signature, sets_of(len(labels))
         text = f"{own.dof} dof ({own.motion}), mobility {own.mobility}"
         apart = [
@@ -209,11 +208,11 @@ class OperationMode:
         if not apart:
             return text
         places, seen = apart[0]
-        return f"{text}, legs {', '.join(labels[i] for i in places)} see {seen} of {own.dof}"
+        return f"{text}, legs {', '.join(labels[i] for i in places)} observe {seen} of {own.dof}"
 
 
 def group_modes(found: Sequence[OperationMode]) -> list[list[OperationMode]]:
-    """The configurations, those together whose signatures agree, the largest group first."""
+    """Group configurations whose signatures agree, the largest group first."""
     groups: list[list[OperationMode]] = []
     for each in found:
         home = next((group for group in groups if group[0].signature.agrees(each.signature)), None)
@@ -226,14 +225,14 @@ def group_modes(found: Sequence[OperationMode]) -> list[list[OperationMode]]:
 
 @lru_cache(maxsize=64)
 def sets_of(count: int) -> tuple[tuple[int, ...], ...]:
-    """The sets of observations whose ranks are compared, by their places."""
+    """Return the sets of observations whose ranks are compared, by their indices."""
     sizes = range(1, count + 1) if count <= LARGEST_WHOLE else (1, 2, count)
     return tuple(each for size in sizes for each in combinations(range(count), size))
 
 
 @lru_cache(maxsize=64)
 def _choose_rows(sizes: tuple[int, ...]) -> Array:
-    """1 in the rows of the rates that belong to each set, (sets, rows)."""
+    """Return 1 in the rows of the rates that belong to each set, (sets, rows)."""
     owner = np.repeat(np.arange(len(sizes)), sizes)
     sets = [np.isin(owner, places) for places in sets_of(len(sizes))]
     return np.array(sets, dtype=float).reshape(len(sets), len(owner))

@@ -1,7 +1,7 @@
 """Coordinates on the closed configurations around one of them, in which an integrator works without drift.
 
 A configuration q near q₀ has the coordinates y = Bᵀ (q ⊖ q₀), B an orthonormal basis of the tangent space at q₀ without
-its idle motions. Going back, the loops are solved together with these n equations.
+its internal motions. Going back, the loops are solved together with these n equations.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from .velocity_relation import ObservationModel
 
 @dataclass(frozen=True, eq=False)
 class _Coordinates:
-    """The coordinates y that are wanted."""
+    """Desired coordinates y."""
 
     chart: TangentChart
     y: Array
 
     def error_and_jacobian(self, model: PinocchioModel, q: Array) -> tuple[Array, Array]:
-        """Error (reached − wanted) and its Jacobian."""
+        """Return the error (reached − desired) and its Jacobian."""
         basis = self.chart.basis
         return basis.T @ model.difference(self.chart.centre.q, q) - self.y, self.chart.slope(q)
 

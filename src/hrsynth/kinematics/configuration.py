@@ -1,4 +1,4 @@
-"""Closed configurations: a type that exists only if its loops are closed; what is measured at one.
+"""Closed configurations: a type that exists only if its loops are closed; measured values at one.
 
 They are found by :func:`.tasks.solve`.
 """
@@ -24,7 +24,7 @@ from .pinocchio_model import PinocchioModel
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ClosedConfiguration(Value):
-    """A configuration of a twin whose loops are closed to ``tolerances.CLOSED``; ``q`` is read-only."""
+    """Configuration of a model whose loops are closed to ``tolerances.CLOSED``; ``q`` is read-only."""
 
     model: PinocchioModel
     q: Array
@@ -32,7 +32,7 @@ class ClosedConfiguration(Value):
 
     @classmethod
     def of(cls, model: PinocchioModel, q: Array, tolerance: float = CLOSED) -> ClosedConfiguration:
-        """``q`` itself, if it is closed; raises ``LoopsNotClosed`` with the loop that misses most."""
+        """Return ``q`` as a closed configuration; raises ``LoopsNotClosed`` with the loop of the largest residual."""
         q = frozen(q)
         residual = float(np.linalg.norm(model.residual(q)))
         if not residual <= tolerance:
@@ -43,7 +43,7 @@ class ClosedConfiguration(Value):
     def several(
         cls, model: PinocchioModel, places: Sequence[Array], tolerance: float = CLOSED
     ) -> list[ClosedConfiguration]:
-        """:meth:`of` of several, their constraints taken apart together."""
+        """Return :meth:`of` of several, their constraints decomposed together."""
         found = [cls.of(model, q, tolerance) for q in places]
         for at, loops in zip(found, spectra([model.jacobian(at.q) for at in found], LOOPS_SCALE), strict=True):
             at.__dict__["loops"] = loops
@@ -59,7 +59,7 @@ class ClosedConfiguration(Value):
 
     @cached_property
     def loops(self) -> Spectrum:
-        """The constraints' Jacobian taken apart."""
+        """Decomposition of the constraints' Jacobian."""
         return spectrum(self.model.jacobian(self.q), LOOPS_SCALE)
 
     def kernel(self) -> tuple[Array, Rank]:
@@ -75,9 +75,9 @@ class ClosedConfiguration(Value):
 def measure(
     model: PinocchioModel, q: Array, reference: str, observations: Sequence[Observation], links: Sequence[str] = ()
 ) -> tuple[Array, Array, list[Array], list[Array]]:
-    """Poses (k, 4, 4) and velocities (k, 6, nv) of ``links``; the value (size,) and the rates (size, nv) of each
-    observation, seen from ``reference`` where it names no link of its own, lengths in characteristic lengths. All are
-    read-only: what is asked again at the same place, as where one target is reached and the next begins, is kept."""
+    """Return poses (k, 4, 4) and velocities (k, 6, nv) of ``links``; the value (size,) and the rates (size, nv) of each
+    observation, from ``reference`` if it names no link of its own, lengths in characteristic lengths. All are
+    read-only: repeated calls at one configuration return the same arrays."""
     asked = reference, tuple(observations), tuple(links)
     last = model.measured
     if last is not None and last[1] is q and last[0] == asked:
@@ -136,7 +136,7 @@ def measure_together(
 
 @dataclass(frozen=True, eq=False)
 class _AlikeObservations:
-    """Observations of one kind, seen from one link: their places among all, the places of the links."""
+    """Observations of one kind, from one link: their indices among all, the indices of the links."""
 
     kind: type[Observation]
     view: int
@@ -173,5 +173,5 @@ def _group_links(
 
 
 def _run(rows: list[int]) -> list[int] | slice:
-    """The same rows, as a slice where they follow each other."""
+    """Return the same rows, as a slice if they are consecutive."""
     return slice(rows[0], rows[-1] + 1) if rows == list(range(rows[0], rows[-1] + 1)) else rows

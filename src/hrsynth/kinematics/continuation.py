@@ -1,4 +1,4 @@
-"""Small steps from a configuration to a goal for the platform, in one working mode."""
+"""Continuation by small steps from a configuration to a goal for the platform, in one working mode."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from .platform_motion import PlatformMotion, PoseTask
 from .tasks import GuidedTask, Task, shorten_step, solve, system
 
 STRIDE = 0.1
-"""Longest step along the way to a pose (characteristic lengths, radians)."""
+"""Longest step along the path to a pose (characteristic lengths, radians)."""
 HALVINGS = 10
-"""How often a step that fails is halved before the way is given up."""
+"""Number of times that a step that fails is halved before the path is given up."""
 JUMP = 0.01
-"""Corrections below this are never jumps: on the edge of the workspace even exact steps need them."""
+"""Length of corrections that are never jumps: on the edge of the workspace even exact steps need them."""
 EASING = 30
-"""Further steps at a goal's own place where the way to it was not straight."""
+"""Further steps at a goal's own place if the path to it was not straight."""
 
 
 def track(
@@ -35,9 +35,12 @@ def track(
     halvings: int = HALVINGS,
     home: Task | None = None,
 ) -> tuple[ClosedConfiguration, float]:
-    """Lead a configuration to a goal by small steps: where it comes to, and the part of the way that it came (1: all of
-    it). A goal of more parts than there are freedoms is met where it is missed by no more than printed digits. What the
-    goal leaves free stays near ``home`` (default: the platform's pose at the zero configuration)."""
+    """Lead a configuration to a goal by small steps.
+
+    Returns the last configuration and the part of the path that was followed (1: all of it). A goal of more parts than
+    dof is met if it is missed by no more than printed digits. What the goal leaves free stays near ``home`` (default:
+    the platform's pose at the zero configuration).
+    """
     X = here.pose(motion.link)
     home = home or motion.at_home()
     error, rows = goal.error_and_jacobian(here.model, here.q)
@@ -65,15 +68,15 @@ def track(
 
 
 def are_dependent(here: ClosedConfiguration, rows: Array) -> bool:
-    """Whether the parts of a goal with Jacobian ``rows`` (k, nv) cannot be chosen one by one with closed loops."""
+    """Return True if the parts of a goal with Jacobian ``rows`` (k, nv) are not independent with closed loops."""
     return range_basis(rows @ here.kernel()[0], 1.0)[1].value < len(rows)
 
 
 def lead_to(
     here: ClosedConfiguration, motion: PlatformMotion, goal: PoseTask, last: bool
 ) -> tuple[ClosedConfiguration, bool]:
-    """The configuration at a goal of the whole pose nearby, and whether it was reached: where parts of the pose depend
-    on each other the nearest one, which is to be the goal's only at the ``last``."""
+    """Return the configuration at a goal of the whole pose nearby, and whether it was reached: if parts of the pose
+    depend on each other the nearest one, which must be the goal's only at the ``last``."""
     if motion.dof >= motion.translations.shape[1] + motion.rotations.shape[1]:
         there, came = track(here, motion, goal)
         return there, came == 1
@@ -82,7 +85,8 @@ def lead_to(
 
 
 def approach(here: ClosedConfiguration, goal: PoseTask, easing: int = EASING) -> ClosedConfiguration:
-    """As near to a goal as small steps with closed loops come, whether the platform can be there or not."""
+    """Return the configuration as near to a goal as small steps with closed loops come, whether the platform can be
+    there or not."""
     error = float(np.linalg.norm(goal.error_and_jacobian(here.model, here.q)[0]))
     return _ease_towards(here, goal, here.pose(goal.link), 1 / max(1, int(np.ceil(error / STRIDE))), easing)
 
@@ -90,8 +94,8 @@ def approach(here: ClosedConfiguration, goal: PoseTask, easing: int = EASING) ->
 def _ease_towards(
     here: ClosedConfiguration, goal: GuidedTask, X: Array, stride: float, easing: int = EASING
 ) -> ClosedConfiguration:
-    """As near as steps with closed loops come to a goal of more parts than the platform has freedoms: the straight way
-    from the pose X need not be one that it can go."""
+    """Return the configuration as near as steps with closed loops come to a goal of more parts than platform dof: the
+    straight path from the pose X need not be one that it can follow."""
     for fraction in (*np.arange(stride, 1, stride), *[1.0] * easing):
         ahead = goal.towards(X, float(fraction))
         if fraction == 1 and np.linalg.norm(ahead.error_and_jacobian(here.model, here.q)[0]) <= SOLVED:
@@ -104,7 +108,7 @@ def _ease_towards(
 
 
 def _step_to(here: ClosedConfiguration, goal: GuidedTask, home: Task, last: bool = True) -> ClosedConfiguration | None:
-    """The configuration at a goal nearby, moved towards ``home`` where parts are free; None where it jumps or lies
+    """Return the configuration at a goal nearby, moved towards ``home`` where parts are free; None if it jumps or is
     beyond a fold, in another working mode, or on one and is not the ``last``."""
     model = here.model
     error, rows = system(model, here.q, goal)
@@ -118,9 +122,9 @@ def _step_to(here: ClosedConfiguration, goal: GuidedTask, home: Task, last: bool
 
 
 def _beyond(before: Array, after: Array, last: bool) -> bool:
-    """Whether a fold lies between two configurations, given the Jacobians of loops and goal at both: the determinant of
-    their rows, on the range of the first, has changed its sign. On the fold itself nothing lies beyond it, but only the
-    ``last`` step may come there: working modes meet, and the next would go on in any."""
+    """Return True if a fold is between two configurations, given the Jacobians of loops and goal at both: the
+    determinant of their rows, on the range of the first, has changed its sign. The fold itself is reached only by the
+    ``last`` step: working modes meet there, and the next step would continue in any."""
     span, _ = range_basis(before)
     turned = bool(np.linalg.slogdet(span.T @ before @ after.T @ span)[0] < 0)
     if turned != last:
@@ -133,8 +137,8 @@ def _beyond(before: Array, after: Array, last: bool) -> bool:
 
 
 def _correct_step(here: ClosedConfiguration, step: Array, goal: GuidedTask | None) -> ClosedConfiguration | None:
-    """The closed configuration at the goal after a step; None where there is none, the correction is a jump, the step
-    does not follow the branch, or a wrist cannot make the turn."""
+    """Return the closed configuration at the goal after a step; None if there is none, the correction is a jump, the
+    step does not follow the branch, or a tilt limit excludes the rotation."""
     model = here.model
     predicted = model.integrate(here.q, step)
     q, residual = solve(model, predicted, goal, tolerance=SOLVED, iterations=15)
@@ -146,16 +150,16 @@ def _correct_step(here: ClosedConfiguration, step: Array, goal: GuidedTask | Non
 
 
 def nearest(here: ClosedConfiguration, goal: GuidedTask, home: Task) -> ClosedConfiguration:
-    """The configuration at ``goal`` nearest to ``home`` (a pose of the platform, other values): the projected gradient
-    vanishes, the loops are closed as well as floating point can; ``here`` itself where the goal is met but for its
-    printed digits."""
+    """Return the configuration at ``goal`` nearest to ``home`` (a pose of the platform, other values): the projected
+    gradient vanishes, the loops are closed as well as floating point can; ``here`` itself if the goal is met but for
+    its printed digits."""
     if np.linalg.norm(goal.error_and_jacobian(here.model, here.q)[0]) > SOLVED:
         return here
     return polish(_drawn_home(here, goal, home, 100), goal)
 
 
 def _drawn_home(here: ClosedConfiguration, goal: GuidedTask, home: Task, iterations: int) -> ClosedConfiguration:
-    """Minimise |home's error| with the goal held."""
+    """Minimise the error of ``home`` with the goal fixed."""
     for _ in range(iterations):
         size = np.linalg.norm(home.error_and_jacobian(here.model, here.q)[0]) + SOLVED
         there = next(
@@ -175,8 +179,8 @@ def _drawn_home(here: ClosedConfiguration, goal: GuidedTask, home: Task, iterati
 def _nearer(
     here: ClosedConfiguration, task: Task, held: GuidedTask | None, cutoff: float, longest: float, least: float = 0.0
 ) -> Iterator[ClosedConfiguration]:
-    """Where a Gauss-Newton step on a task's error leads, in the tangent space of the loops and of what is ``held``, and
-    ever smaller parts of it; nothing where the projected gradient is no more than ``least``."""
+    """Yield Gauss-Newton steps on a task's error, in the tangent space of the loops and of ``held``, in ever smaller
+    parts; nothing if the projected gradient is no more than ``least``."""
     kernel = here.kernel()[0]
     if held is not None:
         kernel, _ = kernel_basis(
@@ -194,8 +198,8 @@ def _nearer(
 
 
 def polish(here: ClosedConfiguration, goal: GuidedTask) -> ClosedConfiguration:
-    """Newton steps of minimum norm until the residual no longer falls: on the edge of the workspace a configuration
-    is only as exact as the square root of its residual."""
+    """Make Newton steps of minimum norm until the residual no longer falls: on the edge of the workspace a
+    configuration is only as exact as the square root of its residual."""
     model, q = here.model, here.q
     error, rows = system(model, q, goal)
     for _ in range(20):
@@ -209,8 +213,8 @@ def polish(here: ClosedConfiguration, goal: GuidedTask) -> ClosedConfiguration:
 
 
 def _on_fold(model: PinocchioModel, q: Array, goal: GuidedTask) -> Array:
-    """The configuration on a fold of the way (the edge of the workspace) where ``q`` cannot be told from it: where the
-    weak singular value of loops and goal vanishes, if the residual stays within ``SOLVED`` there."""
+    """Return the configuration on a fold of the path (the edge of the workspace) if ``q`` is not distinguishable from
+    it: where the smallest singular value of loops and goal vanishes, if the residual stays within ``SOLVED`` there."""
     rows = system(model, q, goal)[1]
     left, values, right = np.linalg.svd(rows, full_matrices=False)
     weak = np.nonzero((values < NEAR_FOLD) & (values > FOLLOWED))[0]

@@ -1,7 +1,7 @@
-"""As many coordinates of a platform as it has freedoms, and what can be reached by changing one of them.
+"""Coordinates of a platform, as many as its dof, and the poses that are reached by changing one of them.
 
-Components of its position in base axes, and its turn since the zero configuration: the angle where it turns about one
-axis only, else components of the rotation vector.
+Components of its position in base axes, and its rotation since the zero configuration: the angle if it rotates about
+one axis only, else components of the rotation vector.
 """
 
 from __future__ import annotations
@@ -26,13 +26,14 @@ from .velocity_relation import ObservationModel, relation
 
 NAMES = ("x", "y", "z", "turn about x", "turn about y", "turn about z")
 INDEPENDENT = 0.5
-"""How independent the coordinates are at least (the smallest singular value of their rates), as part of what it is of
-those that are it most."""
+"""Least independence of the coordinates (the smallest singular value of their rates), as part of that of the most
+independent ones."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Coordinates(Value):
-    """Coordinates of a platform, by their places among :data:`NAMES`, as an aim: ``values`` (n,) in metres, radians."""
+    """Coordinates of a platform, by their indices among :data:`NAMES`, as a task: ``values`` (n,) in metres,
+    radians."""
 
     motion: PlatformMotion
     places: tuple[int, ...]
@@ -40,8 +41,8 @@ class Coordinates(Value):
 
     @classmethod
     def of(cls, start: ClosedConfiguration, observation_model: ObservationModel, motion: PlatformMotion) -> Coordinates:
-        """Those of a configuration that tell its neighbours apart well, positions before turns; where it has other
-        freedoms than the platform generically has, those of the generic motion."""
+        """Return the coordinates that distinguish a configuration from its neighbours best, positions before rotations;
+        if its dof differ from the generic ones, those of the generic motion."""
         twists = relation(start, observation_model.of_platform).twists
         if twists.shape[1] != motion.dof:
             twists = motion.twists
@@ -57,7 +58,7 @@ class Coordinates(Value):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What the coordinates are called."""
+        """Names of the coordinates."""
         names: tuple[str, ...] = NAMES
         if self.motion.rotations.shape[1] == 1:
             axis = _axis(self.motion)
@@ -66,19 +67,19 @@ class Coordinates(Value):
         return tuple(names[place] for place in self.places)
 
     def read(self, X: Array) -> Array:
-        """The coordinates (n,) of a platform pose X (4, 4)."""
+        """Return the coordinates (n,) of a platform pose X (4, 4)."""
         return np.concatenate([self.motion.position(X), self._turn(X)[0]])[list(self.places)]
 
     def apart(self, X: Array) -> Array:
-        """By how much a platform pose X (4, 4) is off the coordinates (n,), metres, radians; a turn about one axis is
-        the same after a whole one."""
+        """Return the difference of a platform pose X (4, 4) from the coordinates (n,), metres, radians; a rotation
+        about one axis modulo 2π."""
         found = self.read(X) - self.values
         if self.motion.rotations.shape[1] == 1:
             found = np.array([wrap_angle(x) if place == 3 else x for x, place in zip(found, self.places, strict=True)])
         return found
 
     def _turn(self, X: Array) -> tuple[Array, Array]:
-        """The turn since the zero configuration, and the map from the angular velocity to its rate."""
+        """Return the rotation since the zero configuration, and the map from the angular velocity to its rate."""
         R = X[:3, :3] @ self.motion.home[:3, :3].T
         if self.motion.rotations.shape[1] == 1:
             angle, row = turn_about(_axis(self.motion), R)
@@ -87,7 +88,7 @@ class Coordinates(Value):
         return turn, logarithm_rate(turn)
 
     def error_and_jacobian(self, model: PinocchioModel, q: Array) -> tuple[Array, Array]:
-        """Error (reached − wanted) in characteristic lengths and radians, and its Jacobian."""
+        """Return the error (reached − desired) in characteristic lengths and radians, and its Jacobian."""
         frames, velocities = model.frames(q, (self.motion.link,))
         X, V = frames[0], velocities[0]
         J = np.vstack([point_velocity(V, X[:3, :3] @ self.motion.point / model.length), self._turn(X)[1] @ V[3:]])
@@ -95,21 +96,21 @@ class Coordinates(Value):
         return self.apart(X) / scale, J[list(self.places)]
 
     def towards(self, X: Array, fraction: float) -> Coordinates:
-        """The coordinates that lie ``fraction`` of the way from the pose X (4, 4) to these."""
+        """Return the coordinates at ``fraction`` of the path from the pose X (4, 4) to these."""
         return replace(self, values=self.values + (1 - fraction) * self.apart(X))
 
     def along(
         self, start: ClosedConfiguration, index: int, spans: tuple[float, float], count: int
     ) -> tuple[tuple[float, ClosedConfiguration], ...]:
-        """Closed configurations as one coordinate alone changes from ``start``, in the order of its values: ``count``
-        on each side, equally spaced as far as small steps lead within ``spans`` (metres, radians)."""
+        """Return closed configurations as one coordinate alone changes from ``start``, in the order of its values:
+        ``count`` on each side, equally spaced as far as small steps lead within ``spans`` (metres, radians)."""
         down, up = (list(self._out(start, index, way, count)) for way in (-spans[0], spans[1]))
         return (*reversed(down), (float(self.values[index]), start), *up)
 
     def ends(
         self, start: ClosedConfiguration, index: int, spans: tuple[float, float]
     ) -> tuple[ClosedConfiguration, ClosedConfiguration]:
-        """Where the robot comes to as one coordinate alone goes down and up from ``start``, within ``spans``."""
+        """Return the last configurations as one coordinate alone goes down and up from ``start``, within ``spans``."""
         down, up = (
             track(start, self.motion, self._change(index, self.values[index] + span))[0]
             for span in (-spans[0], spans[1])
@@ -138,5 +139,5 @@ class Coordinates(Value):
 
 
 def _axis(motion: PlatformMotion) -> Array:
-    """The one axis about which a platform turns, (3,), with the sense of phi where that turns about it."""
+    """Return the one axis about which a platform rotates, (3,), with the sense of phi if that rotates about it."""
     return orient_axis(motion.rotations[:, 0])

@@ -1,4 +1,4 @@
-"""The certificate: at generic configurations a hidden robot follows the real one and has the same relation ρ.
+"""Equivalence check: at generic configurations a hidden robot follows the real one and has the same relation ρ.
 
 Source: docs/pages/theory.md, section 5.
 """
@@ -29,7 +29,7 @@ from .velocity_relation import VelocityRelation, relations
 
 @dataclass(frozen=True, eq=False)
 class Mismatch:
-    """A configuration at which two relations differ; ``position`` is the platform's there (3,)."""
+    """Configuration at which two relations differ; ``position`` is the platform's there (3,)."""
 
     real: VelocityRelation
     hidden: VelocityRelation
@@ -38,8 +38,8 @@ class Mismatch:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class EquivalenceCheck(Result, shown_as="certificate"):
-    """What was compared: configurations, the largest angle between ρ and ρ_H, the smallest rank gap, the largest
-    residual at which the hidden robot follows; ``reason`` says why it did not pass."""
+    """Equivalence check of a hidden robot: configurations, the largest angle between ρ and ρ_H, the smallest rank gap,
+    the largest residual with which the hidden robot follows; ``reason`` of a failure."""
 
     samples: Recorded[int]
     discarded: Recorded[int]
@@ -51,7 +51,7 @@ class EquivalenceCheck(Result, shown_as="certificate"):
     mismatch: Mismatch | None = None
 
     def headline(self) -> str:
-        """Whether it passed, and the largest angle."""
+        """Return the verdict and the largest angle."""
         passed = "passed" if self.passed else f"failed, {self.reason}"
         return f"{passed}: largest angle {self.largest_angle:.1e} at {self.samples} configurations"
 
@@ -147,9 +147,9 @@ def check_equivalence(
 
 
 CLOSER = 8
-"""Parts between two targets of a way, where a robot that is led along it misses one."""
+"""Number of parts between two targets of a path, for a robot that misses one of them."""
 Led = tuple[Array, float] | UndefinedValue
-"""Where a robot was led to, and by how much it misses; or what cannot be measured on the way."""
+"""Configuration to which a robot was led, and its residual; or the observation without a value along the path."""
 
 
 def _follow_ways(model: PinocchioModel, ways: Sequence[Sequence[PoseAndValuesTask]]) -> list[Led]:
@@ -157,7 +157,7 @@ def _follow_ways(model: PinocchioModel, ways: Sequence[Sequence[PoseAndValuesTas
 
 
 def _between(way: Sequence[PoseAndValuesTask], parts: int) -> list[PoseAndValuesTask]:
-    """A way after its first target, with so many parts between two targets."""
+    """Return a path after its first target, with so many parts between two targets."""
     return [one.between(other, part / parts) for one, other in pairwise(way) for part in range(1, parts + 1)]
 
 
@@ -166,8 +166,8 @@ def _has_arrived(led: Led) -> bool:
 
 
 def _as_they_were(samples: Samples, hidden: Mechanism) -> tuple[str, ...]:
-    """The links that a hidden robot keeps with all their joints: where the platform's pose and what is observed leave
-    them a choice, only their own poses say where they are."""
+    """Return the links that a hidden robot keeps with all their joints: their poses do not follow from the platform's
+    pose and the observed values."""
     real = samples.model.mechanism
     same = {
         name
@@ -184,7 +184,8 @@ def _as_they_were(samples: Samples, hidden: Mechanism) -> tuple[str, ...]:
 def _at_real_poses(
     model: PinocchioModel, q: Array, member: Sample, target: PoseAndValuesTask, kept: tuple[str, ...]
 ) -> Array:
-    """The configuration with the kept links where the real robot has them too, if it is found from one without."""
+    """Return the configuration with the kept links where the real robot has them too, if it is found from one
+    without."""
     poses = tuple((link, member.configuration.pose(link)) for link in kept)
     found, residual = solve(model, q, LinkPoses(poses, target), tolerance=SOLVED)
     return found if residual <= FOLLOWED else q
@@ -199,7 +200,7 @@ def _difference(ours: VelocityRelation, theirs: VelocityRelation, angle: float) 
 def _parametrise(
     at: Sequence[ClosedConfiguration], rows: Sequence[Array], sizes: Sequence[int], active: list[int], complete: bool
 ) -> list[bool]:
-    """Whether, at each configuration, each actuator's rate follows from the rate of one observation alone, and
+    """Return True if, at each configuration, each actuator's rate follows from the rate of one observation alone, and
     (``complete``) each observation's rate from those of its own actuators; ``rows`` are those of the observations."""
     kernels = [each.kernel()[0] for each in at]
     measured = [moved @ kernel for moved, kernel in zip(rows, kernels, strict=True)]

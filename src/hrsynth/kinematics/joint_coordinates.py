@@ -1,4 +1,4 @@
-"""Coordinates of a file's joints at a closed configuration, and closed configurations by these coordinates.
+"""Coordinates of a file's joints at a closed configuration, and closed configurations by them.
 
 They count as the file counts: from its zero, in its sense, metres and radians, turns not modulo 2π. Balls, planar and
 free joints have none.
@@ -31,17 +31,17 @@ from .platform_motion import PlatformMotion
 from .tasks import LinkPoses, solve
 
 COUNTED = (JointType.REVOLUTE, JointType.PRISMATIC, JointType.UNIVERSAL, JointType.CYLINDRICAL)
-"""The joints that have coordinates here: a slide before a turn, turns in the order of the axes."""
+"""Return the joints that have coordinates here: a translation before a rotation, rotations in the order of the axes."""
 
 
 def counted_joints(robot: Mechanism, motors: bool = False) -> list[Joint]:
-    """The joints of a robot that have coordinates, or only its motors, in the order of the file."""
+    """Return the joints of a robot that have coordinates, or only its motors, in the order of the file."""
     return [each for each in robot.joints.values() if each.type in COUNTED and (each.actuated or not motors)]
 
 
 def as_written(at: ClosedConfiguration) -> ClosedConfiguration | None:
-    """A configuration in the joints that the robot's file has; None where the normal form has made one joint of
-    several, and the poses of the links that are left do not fit the file's joints."""
+    """Return a configuration in the joints that the robot's file has; None if the normal form has made one joint of
+    several, and the poses of the remaining links do not fit the file's joints."""
     robot = at.model.mechanism.written or at.model.mechanism
     if all(joint.name in at.model.coordinates for joint in counted_joints(robot)):
         return at
@@ -53,8 +53,8 @@ def as_written(at: ClosedConfiguration) -> ClosedConfiguration | None:
 
 
 def read_joints(at: ClosedConfiguration) -> dict[str, tuple[float, ...]]:
-    """The coordinates of the joints of a robot, as its file has them, at a configuration of it or of its normal form;
-    none are told where the file's joints do not fit."""
+    """Return the coordinates of the joints of a robot, as its file has them, at a configuration of it or of its normal
+    form; none if the file's joints do not fit."""
     own = as_written(at)
     if own is None:
         return {}
@@ -70,13 +70,13 @@ def read_joints(at: ClosedConfiguration) -> dict[str, tuple[float, ...]]:
 
 @lru_cache(maxsize=8)
 def _model(robot: Mechanism, length: float) -> PinocchioModel:
-    """The model of a robot as its file has it: made once for many configurations."""
+    """Return the model of a robot as its file has it: made once for many configurations."""
     return PinocchioModel(robot, length)
 
 
 def _shared(one: PinocchioModel, q: Array, other: PinocchioModel) -> Array:
-    """The step (nv) from another model's zero configuration at which the R and P that it has too have the values of a
-    configuration."""
+    """Return the step (nv) from another model's zero configuration at which the R and P that it has too have the values
+    of a configuration."""
     at, step = one.difference(one.q0, q), np.zeros(other.nv)
     for name, joint in one.mechanism.joints.items():
         model = other.mechanism.joints.get(name)
@@ -87,20 +87,20 @@ def _shared(one: PinocchioModel, q: Array, other: PinocchioModel) -> Array:
 
 
 def _units(joint: Joint, length: float) -> Array:
-    """What the coordinates are counted in (m, rad)."""
+    """Units of the coordinates (m, rad)."""
     if joint.type is JointType.CYLINDRICAL:
         return np.array([length, 1.0])
     return np.full(joint.type.freedoms, length if joint.type.slides else 1.0)
 
 
 def _offset(joint: Joint) -> Array:
-    """The file's coordinates at the zero configuration."""
+    """Coordinates of the file at the zero configuration."""
     return np.zeros(joint.type.freedoms) if joint.offset is None else joint.offset
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class JointAim(Value):
-    """Coordinates of a twin (by their ``places`` in its velocities) that are wanted, from ``begun`` where a way to them
+    """Desired coordinates of a model (by their ``places`` in its velocities), from ``begun`` where a path to them
     starts; characteristic lengths, radians."""
 
     places: NDArray[np.intp]
@@ -108,20 +108,20 @@ class JointAim(Value):
     values: Array
 
     def error_and_jacobian(self, model: PinocchioModel, q: Array) -> tuple[Array, Array]:
-        """Error (reached − wanted) and its Jacobian."""
+        """Return the error (reached − desired) and its Jacobian."""
         return model.difference(model.q0, q)[self.places] - self.values, np.eye(model.nv)[self.places]
 
     def towards(self, X: Array, fraction: float) -> JointAim:
-        """What lies ``fraction`` of the way; the platform's pose X (4, 4) says nothing here."""
+        """Return the task at ``fraction`` of the path; the platform's pose X (4, 4) is not used here."""
         return self if fraction == 1 else replace(self, values=self.begun + fraction * (self.values - self.begun))
 
 
 def reach_joints(start: ClosedConfiguration, motion: PlatformMotion, asked: JointPose) -> ClosedConfiguration:
-    """The configuration with these coordinates that small steps lead to from the zero configuration ``start`` on its
-    branch, all joints within their limits; coordinates that depend on others must agree with them.
+    """Return the configuration with these coordinates that small steps reach from the zero configuration ``start`` on
+    its branch, all joints within their limits; coordinates that depend on others must agree with them.
 
-    Raises ``BadRequest`` for unknown joints, their number and values beyond limits, ``PoseNotReached`` where the way
-    ends before, saying which joint stops it.
+    Raises ``BadRequest`` for unknown joints, their number and values beyond limits, ``PoseNotReached`` if the path ends
+    before, with the joint that stops it.
     """
     home, name = as_written(start), start.model.mechanism.name
     if home is None:
@@ -139,14 +139,14 @@ def reach_joints(start: ClosedConfiguration, motion: PlatformMotion, asked: Join
 
 
 def _wanted(home: ClosedConfiguration, asked: JointPose) -> dict[str, tuple[float, ...]]:
-    """The coordinates by name: those that are asked for, and those of motors that stay as they are."""
+    """Return the coordinates by name: the requested ones, and those of motors that stay as they are."""
     robot = home.model.mechanism
     joints = {joint.name: joint for joint in counted_joints(robot, asked.motors)}
     sizes = {name: joint.type.freedoms for name, joint in joints.items()}
     if asked.motors:
         robot.require_motors()
     if not joints:
-        raise BadRequest(f"{robot.name} has no joint with coordinates", str(asked), "another pose")
+        raise BadRequest(f"{asked}: {robot.name} has no joint with coordinates", remedy="Use a pose of the platform.")
     given, degrees = dict(asked.values), {*asked.degrees}
     if "" in given:
         flat = [x for _, part in asked.values for x in part]
@@ -163,14 +163,14 @@ def _wanted(home: ClosedConfiguration, asked: JointPose) -> dict[str, tuple[floa
             raise BadRequest(
                 f"{robot.name}: coordinates of {name}",
                 "/".join(map(str, values)),
-                "one number" if sizes[name] == 1 else "two numbers with / between",
+                "one number" if sizes[name] == 1 else "two numbers, as 0.1/0.2",
             )
         if name in degrees and joints[name].type.slides:
-            raise BadRequest(f"{robot.name}: {name} slides", "degrees", "metres")
+            raise BadRequest(f"{robot.name}: unit of prismatic joint {name}", "degrees", "metres")
         low, high = robot.filed.get(name, (-np.inf, np.inf))
         if not low - SAME_POINT <= min(values) <= max(values) <= high + SAME_POINT:
             told = "/".join(map(str, values))
-            raise BadRequest(f"{robot.name}: {name} beyond its limits", told, f"{low:.6g} to {high:.6g}")
+            raise BadRequest(f"{robot.name}: {name} is beyond its limits", told, f"{low:.6g} to {high:.6g}")
     stay = {name: values for name, values in read_joints(home).items() if asked.motors and name in joints}
     return {**stay, **given}
 
@@ -178,7 +178,7 @@ def _wanted(home: ClosedConfiguration, asked: JointPose) -> dict[str, tuple[floa
 def _lead(
     home: ClosedConfiguration, motion: PlatformMotion, wanted: Mapping[str, tuple[float, ...]], asked: JointPose
 ) -> ClosedConfiguration:
-    """Steps from the zero configuration to coordinates, as many of them at a time as can be chosen one by one."""
+    """Follow steps from the zero configuration to coordinates, as many of them at a time as are independent."""
     from scipy.linalg import qr
 
     model, robot = home.model, home.model.mechanism
@@ -196,14 +196,14 @@ def _lead(
     before, here, came = stops.margins(model, home.q), home, 0.0
 
     def past(at: ClosedConfiguration) -> dict[str, float]:
-        """The joints that are farther beyond their limits than they were, and by how much."""
+        """Return the joints that are farther beyond their limits than they were, and by how much."""
         margins = stops.margins(model, at.q).items()
         return {joint: margin for joint, margin in margins if margin < min(before[joint], 0.0) - SAME_POINT}
 
     def refuse(stopped: str) -> PoseNotReached:
         told = read_joints(here)
         last = ",".join(f"{joint}={'/'.join(f'{x:.6g}' for x in told[joint])}" for joint in wanted)
-        way = f"; from its zero configuration the robot gets {100 * came:.3g} % of the way" * (came < 1)
+        way = f"; the robot follows {100 * came:.3g} % of the path from its zero configuration" * (came < 1)
         return PoseNotReached(robot.name, str(asked), came, f"{asked.kind}:{last}", reason=stopped + way)
 
     goal = values[free]
@@ -221,7 +221,7 @@ def _lead(
     if missed.max() > AS_PRINTED:
         joint = names[int(np.argmax(missed))]
         told = "/".join(f"{x:.6g}" for x in read_joints(here)[joint])
-        raise refuse(f"with the others as they are {joint} is {told}")
+        raise refuse(f"with the other coordinates fixed {joint} is {told}")
     there = nearest(here, JointAim(places[free], goal, goal), rest)
     return here if past(there) else there
 
@@ -232,7 +232,7 @@ Told = dict[str, float | tuple[float, ...]]
 
 @dataclass(frozen=True, repr=False)
 class FileCoordinates(Record, all_recorded=True):
-    """Coordinates of the file's joints at a configuration (m, rad), counted from its zero: of the driven ones
+    """Coordinates of the file's joints at a configuration (m, rad), relative to its zero: of the actuated ones
     (``motors``) and of the others."""
 
     motors: Told
@@ -243,7 +243,7 @@ class FileCoordinates(Record, all_recorded=True):
 
     @classmethod
     def of(cls, at: ClosedConfiguration) -> FileCoordinates:
-        """Those at a configuration."""
+        """Return those at a configuration."""
         robot = at.model.mechanism.written or at.model.mechanism
         found = {name: each[0] if len(each) == 1 else each for name, each in read_joints(at).items()}
         driven = {name: value for name, value in found.items() if robot.joints[name].actuated}
@@ -251,12 +251,12 @@ class FileCoordinates(Record, all_recorded=True):
 
 
 class OfConfiguration:
-    """What has a configuration, and tells the coordinates of its joints."""
+    """Result with a configuration, and the coordinates of its joints."""
 
     configuration: ClosedConfiguration | None
 
     @property
     @recorded()
     def coordinates(self) -> FileCoordinates | None:
-        """The coordinates of the file's joints; None without a configuration."""
+        """Coordinates of the file's joints; None without a configuration."""
         return None if self.configuration is None else FileCoordinates.of(self.configuration)

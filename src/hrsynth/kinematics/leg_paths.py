@@ -1,7 +1,8 @@
-"""The ways of a leg from the base to its end as screws at the zero configuration: the end's displacement is the product
-of the joints' displacements, E_1(q_1) … E_n(q_n).
+"""Paths of a leg from the base to its end as screws at the zero configuration: the end's displacement is the product of
+the joints' displacements, E_1(q_1) … E_n(q_n).
 
-A leg with inner loops has several ways; each alone asks less than the leg, so what no way allows the leg does not.
+A leg with inner loops has several paths; each alone is a weaker condition than the leg, so what a path excludes the leg
+excludes.
 """
 
 from __future__ import annotations
@@ -23,16 +24,16 @@ from ..mechanism.tilt_limit import TiltLimit
 from ..tolerances import SAME_GEOMETRY
 
 WAYS = 16
-"""Ways of one leg that are looked at, at most."""
+"""Largest number of paths of one leg."""
 OBLIQUE = 1e-2
-"""Sine of the angle between two axes from which the point where they meet is taken as known."""
+"""Least sine of the angle between two axes whose intersection is taken as known."""
 
 
 @dataclass(frozen=True, eq=False)
 class MotionFactor:
     """A turn about ``axis`` through ``point`` (R), a shift along ``axis`` (P), or turns about several axes through
     ``point`` (``axis`` None: S, U, axes that meet), which are taken for any turn about it. ``joints`` are those it is
-    made of; ``pair`` are the two axes, from the base, where it has no more; ``limit`` is the wrist of one S."""
+    made of; ``pair`` are the two axes, from the base, where it has no more; ``limit`` is the tilt limit of one S."""
 
     slides: bool
     point: Array
@@ -43,27 +44,27 @@ class MotionFactor:
 
     @property
     def wrist(self) -> bool:
-        """Whether it turns about a point."""
+        """True if it rotates about a point."""
         return self.axis is None
 
     @property
     def turns(self) -> bool:
-        """Whether it turns about one axis."""
+        """True if it rotates about one axis."""
         return self.axis is not None and not self.slides
 
     @property
     def direction(self) -> Field:
-        """The axis, to be multiplied by balls."""
+        """Axis, to be multiplied by balls."""
         assert self.axis is not None
         return self.axis.astype(object)
 
     @property
     def joint(self) -> str | None:
-        """The joint whose coordinate is the part's, where it is one R or P."""
+        """Joint whose coordinate is the part's, if it is one R or P."""
         return self.joints[0] if self.axis is not None and len(self.joints) == 1 else None
 
     def circle(self, x: Field) -> tuple[Field, Field, Field]:
-        """The circle of a point about the axis: x(q) = centre + v cos q + w sin q (Rodrigues)."""
+        """Return the circle of a point about the axis: x(q) = centre + v cos q + w sin q (Rodrigues)."""
         axis = self.direction
         arm = x - self.point
         along = dot(arm, axis) * axis
@@ -71,26 +72,26 @@ class MotionFactor:
         return self.point + along, v, cross(axis, v)
 
     def moved(self, x: Field, q: Any) -> Field:
-        """Where the part with value q brings a point."""
+        """Return the point moved by the part with value q."""
         if self.slides:
             return np.asarray(x + np.asarray(self.direction * q))
         centre, v, w = self.circle(x)
         return np.asarray(centre + v * q.cos() + w * q.sin())
 
     def rotated(self, vector: Field, q: Any) -> Field:
-        """A vector turned with the part by q."""
+        """Return a vector rotated with the part by q."""
         return replace(self, point=np.zeros(3)).moved(vector, q)
 
     def reversed(self) -> MotionFactor:
-        """The part seen from its other side: the same coordinate, the opposite motion."""
+        """Return the part from its other side: the same coordinate, the opposite motion."""
         pair = None if self.pair is None else (self.pair[1], self.pair[0])
         limit = None if self.limit is None else self.limit.turned()
         return replace(self, axis=None if self.axis is None else -self.axis, pair=pair, limit=limit)
 
 
 def ways(decomposition: LegDecomposition, leg: Leg) -> Iterator[tuple[MotionFactor, ...]]:
-    """The ways from the base to the link on which a leg ends, up to ``WAYS``, without those through a free joint; where
-    the platform is a point, any turn about it is their last part."""
+    """Yield the paths from the base to the link on which a leg ends, up to ``WAYS``, without those through a free
+    joint; if the platform is a point, any rotation about it is their last part."""
     mechanism = decomposition.mechanism
     frame, point = mechanism.links[mechanism.platform].pose, decomposition.point
     last = () if point is None else (MotionFactor(False, transform(frame, point), None, ()),)
@@ -111,7 +112,7 @@ def ways(decomposition: LegDecomposition, leg: Leg) -> Iterator[tuple[MotionFact
 
 
 def _parts(joint: Joint, near: str) -> list[MotionFactor]:
-    """A joint as parts, seen from one of its links."""
+    """Return a joint as parts, from one of its links."""
     seen = joint if joint.predecessor == near else joint.turned()
     point, name = np.asarray(seen.point), (joint.name,)
     one = (*name, "") if joint.type.freedoms > 1 else name
@@ -124,8 +125,8 @@ def _parts(joint: Joint, near: str) -> list[MotionFactor]:
 
 
 def gather_parts(parts: tuple[MotionFactor, ...], tolerance: float) -> tuple[MotionFactor, ...]:
-    """The parts with neighbours that turn about one point or one axis made one; ``tolerance`` in metres, by which
-    axes may miss each other."""
+    """Join neighbouring parts that rotate about one point or one axis; ``tolerance`` in metres, by which axes may miss
+    each other."""
     found: list[MotionFactor] = []
     for part in parts:
         merged = _merge(found[-1], part, tolerance) if found else None

@@ -1,4 +1,4 @@
-"""Which leg alone cannot bring the platform to a pose, and by how much it misses."""
+"""Leg that alone cannot bring the platform to a pose, and by how much it misses."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from .platform_motion import PlatformMotion, PoseTask
 from .tasks import solve
 
 WAY = 10
-"""Points of the way at which a leg alone is led towards a pose, so that it keeps its working mode."""
+"""Number of points of the path along which a leg alone is led towards a pose, so that it keeps its working mode."""
 ASIDE = 8
-"""Random starts from which a leg that seems to miss is led again: a stretched one does not bend by itself."""
+"""Number of random starts from which a leg that seems to miss is led again: a stretched one does not bend by itself."""
 SETTLED = 3
-"""Steps over which an error that hardly falls any more is what is left."""
+"""Number of steps after which an error that hardly falls any more is final."""
 HOPELESS = 100.0
-"""So many times what these steps win must lead below what is reached already, or the start is given up."""
+"""Factor: so many times the gain of these steps must lead below the best error, or the start is given up."""
 DAMPING = Damping(start=1e-3, eased=0.2, least=1e-12, most=1e7)
 
 
 def worst_leg(model: PinocchioModel, motion: PlatformMotion, goal: PoseTask) -> LegMiss | None:
-    """The leg that alone misses a goal most, None where each leg reaches it: by its rods' lengths where that is more
-    than these together, else by what a descent leaves.
+    """Return the leg that alone misses a goal most, None if each leg reaches it: by its rods' lengths if that is more
+    than these together, else by the error that a descent leaves.
 
-    Each leg is taken with base and platform alone; the platform keeps to what it generically does.
+    Each leg is taken with base and platform alone; the platform keeps its generic motion.
     """
     try:
         decomposition = decompose(model.mechanism)
@@ -62,7 +62,7 @@ def worst_leg(model: PinocchioModel, motion: PlatformMotion, goal: PoseTask) -> 
 
 
 def beyond_rods(mechanism: Mechanism, motion: PlatformMotion, goals: Sequence[PoseTask]) -> set[int]:
-    """The places of goals that some leg misses by its rods' lengths."""
+    """Return the indices of goals that some leg misses by its rods' lengths."""
     try:
         decomposition = decompose(mechanism)
     except HrsynthError:
@@ -73,12 +73,13 @@ def beyond_rods(mechanism: Mechanism, motion: PlatformMotion, goals: Sequence[Po
 def rod_misses(
     decomposition: LegDecomposition, motion: PlatformMotion, goals: Sequence[PoseTask]
 ) -> Iterator[tuple[str, float, Array]]:
-    """Of each leg its label, the sum of its rods' lengths to the platform's point, and by how much (n,) it misses goals
-    at least, as these lengths tell (m); not positive where they do not.
+    """Yield for each leg its label, the sum of its rods' lengths to the platform's point, and a lower bound (n,) of its
+    distance from goals by these lengths (m); not positive if they give none.
 
     Centres of R, U and S joints keep their distances on each link. So along a chain of them an end is at most the sum
-    of these away from the first one, and at least twice the longest less that sum: the platform's point, and where a
-    goal leaves no turn free the last centre. Of a point that may move it counts how far it is in wanted directions."""
+    of these away from the first one, and at least twice the longest less that sum: the platform's point, and if a goal
+    leaves no rotation free the last centre. Of a point that may move only the distance in desired directions counts.
+    """
     point = motion.position(motion.home)
     X = np.array([motion.pose_of(goal) for goal in goals]).reshape(-1, 4, 4)
     placed, turned = (
@@ -102,7 +103,7 @@ def rod_misses(
 
 
 def _centres(decomposition: LegDecomposition, motion: PlatformMotion) -> Iterator[tuple[str, Array]]:
-    """Of legs through which there are such chains the centres (n, 3) of the joints from the base to the platform."""
+    """Return, for legs with such chains, the centres (n, 3) of the joints from the base to the platform."""
     mechanism = decomposition.mechanism
     centred = (JointType.REVOLUTE, JointType.UNIVERSAL, JointType.SPHERICAL)
     for leg in decomposition.legs:
@@ -120,7 +121,7 @@ def _centres(decomposition: LegDecomposition, motion: PlatformMotion) -> Iterato
 
 
 def alone(decomposition: LegDecomposition, leg: Leg) -> Mechanism:
-    """One leg with base and platform, the other legs taken away."""
+    """Return one leg with base and platform, without the other legs."""
     mechanism = decomposition.mechanism
     kept = {mechanism.base, *decomposition.platform, *leg.links}
     others = [name for other in decomposition.legs if other is not leg for name in other.joints]
@@ -130,8 +131,8 @@ def alone(decomposition: LegDecomposition, leg: Leg) -> Mechanism:
 
 
 def _miss(model: PinocchioModel, motion: PlatformMotion, goal: PoseTask) -> Array:
-    """The error of a goal that is left when the leg comes as near as its loops and the platform's manner allow: from
-    zero, else from wherever it comes nearest."""
+    """Return the error of a goal that is left when the leg comes as near as its loops and the platform's motion allow:
+    from zero, else from its nearest configuration."""
     at = ClosedConfiguration.of(model, model.q0, FOLLOWED)
     X, manner = at.pose(motion.link), motion.manner()
     for number in range(1, WAY + 1):
@@ -154,7 +155,7 @@ def _approach(
     at: ClosedConfiguration, goal: PoseTask, manner: PoseTask, iterations: int, known: float = np.inf
 ) -> ClosedConfiguration:
     """Minimise a goal's error with the loops closed and ``manner`` kept: damped Gauss-Newton in the tangent space;
-    given up where the error will not fall below the one that is ``known``."""
+    given up if the error will not fall below the one that is ``known``."""
     model = at.model
 
     def tangent(at: ClosedConfiguration) -> tuple[ClosedConfiguration, Array]:
@@ -178,7 +179,7 @@ def _approach(
     def content(left: Residual) -> bool:
         if not sizes or left.size < sizes[-1]:
             sizes.append(left.size)
-        # far from a goal out of reach the steps become short, as J does not tell how its rows turn
+        # far from a goal out of reach the steps become short, as J does not contain how its rows rotate
         won = sizes[-1 - SETTLED] - left.size if len(sizes) > SETTLED else np.inf
         return (
             won <= NO_NEARER * left.size

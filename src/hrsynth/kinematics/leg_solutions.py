@@ -1,4 +1,4 @@
-"""All closures of a leg at a pose of its end, in balls: the values that one of its joints can have there, or the proof
+"""Leg solutions at a pose of the leg's end, in balls: the values that one of its joints can have there, or the proof
 that it has none.
 
 A way of a leg (:mod:`ways`) is cut at its first and its last part. What is fixed beyond the last (its centre, or two
@@ -29,7 +29,7 @@ from .leg_paths import MotionFactor
 
 @dataclass(frozen=True)
 class ReachFailure(Record, all_recorded=True):
-    """Why a leg does not close, and by how much at least (m, or rad)."""
+    """Failure of a leg to close: the reason, and by how much it misses at least (m, or rad)."""
 
     words: Annotated[str, As("reason")]
     by: Annotated[float, Number]
@@ -41,8 +41,8 @@ class ReachFailure(Record, all_recorded=True):
 
 @dataclass(frozen=True, eq=False)
 class LegSolutions:
-    """What a way of a leg allows at a pose: nothing (``miss``), or of some joints all values, as balls, turns modulo
-    2π; those of one way in the same order."""
+    """Solutions of a path of a leg at a pose: none (``miss``), or of some joints all values, as balls, rotations modulo
+    2π; those of one path in the same order."""
 
     miss: ReachFailure | None = None
     values: tuple[tuple[str, tuple[Any, ...]], ...] = ()
@@ -54,8 +54,8 @@ ORIGIN = np.zeros(3)
 
 @dataclass(frozen=True, eq=False)
 class LegEnd:
-    """Where a way ends: displaced from zero by D (4, 4); every number of D is known to ``within`` (characteristic
-    lengths, of ``length`` m; pure numbers). ``turns``: whether its turn counts, else the position of its last part."""
+    """End of a path: displaced from zero by D (4, 4); every number of D is known to ``within`` (characteristic lengths,
+    of ``length`` m; pure numbers). ``turns``: whether its rotation counts, else the position of its last part."""
 
     D: Array
     length: float
@@ -63,20 +63,20 @@ class LegEnd:
     turns: bool = True
 
     def target(self, x: Array) -> Field:
-        """Balls around where a point (3,) of the end is."""
+        """Return balls around a point (3,) of the end."""
         size = self.length + float(np.abs(x).sum() + np.abs(self.D[:3, 3]).max())
         return around(self.D[:3, :3] @ x + self.D[:3, 3], max(self.within, OUT_OF_REACH) * size)
 
     def ball(self, x: Array) -> Field:
-        """Balls around a point of the mechanism, as exact as its relations are taken."""
+        """Return balls around a point of the mechanism, as exact as its incidences are taken."""
         return around(x, SAME_GEOMETRY * self.length)
 
 
 def closures(way: Sequence[MotionFactor], end: LegEnd) -> LegSolutions:
-    """All closures of a way, seen from the base or, where the end's turn counts, from the end."""
+    """Return all solutions of a path, from the base or, where the end's rotation counts, from the end."""
     turning = [part for part in way if not part.slides]
     if end.turns and len(turning) == 1 and turning[0].joint is not None:
-        # one part alone turns the end: entries of D off by w change its angle by 3w at most
+        # one part alone rotates the end: entries of D off by w change its angle by 3w at most
         angle = float(logarithm(end.D[:3, :3]) @ turning[0].direction)
         return LegSolutions(
             None, ((turning[0].joint, (*around(np.array([angle]), 3 * max(end.within, OUT_OF_REACH)),)),)
@@ -88,7 +88,8 @@ def closures(way: Sequence[MotionFactor], end: LegEnd) -> LegSolutions:
 
 
 def leg_closures(several: Sequence[Sequence[MotionFactor]], end: LegEnd) -> LegSolutions:
-    """What all ways of a leg together allow: a miss of one, or values of one joint that all of them share."""
+    """Return the solutions of all paths of a leg together: a miss of one, or values of one joint that all of them
+    share."""
     known: dict[str, tuple[Any, ...]] = {}
     for way in several if np.isfinite(end.within) else ():
         found = closures(way, end)
@@ -101,7 +102,7 @@ def leg_closures(several: Sequence[Sequence[MotionFactor]], end: LegEnd) -> LegS
             if gaps and not kept:
                 return LegSolutions(
                     ReachFailure(
-                        f"its rods ask for different values of joint {joint}",
+                        f"its rods need different values of joint {joint}",
                         min(map(min, gaps)),
                         "m" if slides else "rad",
                     )
@@ -111,7 +112,7 @@ def leg_closures(several: Sequence[Sequence[MotionFactor]], end: LegEnd) -> LegS
 
 
 def _apart(one: Any, other: Any, slides: bool) -> float:
-    """A lower bound of the difference of two values, of turns modulo 2π; 0 where they may be the same."""
+    """Return a lower bound of the difference of two values, of rotations modulo 2π; 0 if they may be the same."""
     from flint import arb
 
     gap = one - other
@@ -121,7 +122,7 @@ def _apart(one: Any, other: Any, slides: bool) -> float:
 
 
 def _closures(way: Sequence[MotionFactor], end: LegEnd) -> LegSolutions:
-    """The closures of a way seen from its first part."""
+    """Return the solutions of a path from its first part."""
     if len(way) not in (2, 3) or way[-1].slides:
         return UNDECIDED
     first, last = way[0], way[-1]
@@ -134,9 +135,9 @@ def _closures(way: Sequence[MotionFactor], end: LegEnd) -> LegSolutions:
     B = way[1].point
     rods = [_square(end.ball(B) - x) for x in far]
     if first.axis is not None:
-        words = f"the rod from {_name(way[1])} to {_name(last)} is {{sought}} long, {{span}} would do"
+        words = f"the rod from {_name(way[1])} to {_name(last)} is {{sought}} long, not {{span}}"
         laws = [_distance(first, end.ball(B), T, rod, words) for T, rod in zip(targets, rods, strict=True)]
-        # seen from the first part, the rod's far end must be where the U between them can bring it
+        # from the first part, the rod's far end must be where the U between them can bring it
         return _solve_laws(
             laws,
             None,
@@ -168,23 +169,23 @@ class _Law:
     words: str
 
     def at(self, q: Any) -> Any:
-        """The left side."""
+        """Left side of the law."""
         one, other = (q.cos(), q.sin()) if self.turns else (q, q * q)
         return self.K + self.alpha * one + self.beta * other
 
     @property
     def swing(self) -> Any:
-        """By how much a turn changes the left side at most."""
+        """Largest change of the left side by a rotation."""
         return _root(self.alpha * self.alpha + self.beta * self.beta)
 
     def prove_miss(self, low: Any, high: Any | None) -> ReachFailure | None:
-        """The proof that what is wanted lies outside of an interval of the left side (None: no upper bound)."""
+        """Return the proof that the value is outside of an interval of the left side (None: no upper bound)."""
         if self.squared:
             return _miss_outside(_root(low), None if high is None else _root(high), _root(self.wanted), self.words)
         return _miss_outside(low, high, self.wanted, self.words)
 
     def miss(self) -> ReachFailure | None:
-        """The proof that no q does, where there is one."""
+        """Proof that no q is a solution, if there is one."""
         if self.turns:
             return self.prove_miss(self.K - self.swing, self.K + self.swing)
         if self.squared:
@@ -193,7 +194,7 @@ class _Law:
         return self.prove_miss(self.K, self.K) if self.alpha.contains(0) else None
 
     def roots(self) -> list[Any]:
-        """Balls that hold all q; none where every q may do."""
+        """Return balls that contain all q; none if every q may be a solution."""
         from flint import arb
 
         rest = self.wanted - self.K
@@ -212,7 +213,7 @@ class _Law:
 def _kept_laws(
     first: MotionFactor, moving: MotionFactor | None, last: MotionFactor, x: Array, target: Field, end: LegEnd
 ) -> list[_Law]:
-    """What the first part keeps of a point x of the last that ``moving`` moves to the target."""
+    """Return the laws of the first part for a point x of the last that ``moving`` moves to the target."""
     if first.axis is not None and first.slides:
         words = f"{_name(last)} would be at {{sought}} across the rail {_name(first)}, and reaches {{span}}"
         return [_height(moving, end.ball(x), normal, target, words) for normal in plane_axes(first.axis)]
@@ -257,8 +258,8 @@ def _solve_laws(
     end: LegEnd,
     more: Callable[[Any], list[ReachFailure]] = lambda q: [],
 ) -> LegSolutions:
-    """All values of the moving part by laws that hold together and by what ``more`` refuses, and of the first part's
-    joint with each."""
+    """Return all values of the moving part by laws that are met together and not refused by ``more``, and of the first
+    part's joint with each."""
     misses = [miss for law in laws if (miss := law.miss()) is not None]
     if misses:
         return LegSolutions(max(misses, key=lambda miss: miss.by))
@@ -283,18 +284,18 @@ def _solve_laws(
 
 
 def _tilt_misses(first: MotionFactor | None, x: Field, target: Field) -> list[ReachFailure]:
-    """The proof that a U cannot bring x to the target: of what a turn about its second axis makes of x, the height
-    along the first must be the target's."""
+    """Return the proof that a U cannot bring x to the target: a rotation about its second axis must give x the target's
+    height along the first."""
     if first is None or first.pair is None:
         return []
     outer, inner = first.pair
-    words = f"{{sought}} along the first axis of {_name(first)} is wanted of its far end, which reaches {{span}}"
+    words = f"its far end would be at {{sought}} along the first axis of {_name(first)}, and reaches {{span}}"
     miss = _height(MotionFactor(False, first.point, inner, ()), x, outer, target, words).miss()
     return [] if miss is None else [miss]
 
 
 def _carrying_value(first: MotionFactor, x: Field, target: Field) -> Any:
-    """The value with which a part brings x to the target."""
+    """Return the value with which a part brings x to the target."""
     from flint import arb
 
     if first.slides:
@@ -306,7 +307,7 @@ def _carrying_value(first: MotionFactor, x: Field, target: Field) -> Any:
 
 
 def _miss_outside(low: Any, high: Any | None, wanted: Any, words: str) -> ReachFailure | None:
-    """The proof that a ball lies outside of an interval between balls; ``words`` have places for both."""
+    """Return the proof that a ball is outside of an interval between balls; ``words`` have places for both."""
     by = max(float((low - wanted).lower()), -1.0 if high is None else float((wanted - high).lower()))
     if not by > 0:
         return None
@@ -332,7 +333,7 @@ def _square(v: Field) -> Any:
 
 
 def _root(x: Any) -> Any:
-    """√ of the part of a ball that is not negative."""
+    """Return √ of the part of a ball that is not negative."""
     from flint import arb
 
     low, high = (max(arb(0), each).sqrt() for each in (x.lower(), x.upper()))
@@ -340,7 +341,7 @@ def _root(x: Any) -> Any:
 
 
 def _acos(x: Any) -> Any:
-    """arccos of the part of a ball within [−1, 1]."""
+    """Return arccos of the part of a ball within [−1, 1]."""
     from flint import arb
 
     low, high = (min(arb(1), max(arb(-1), each)).acos() for each in (x.lower(), x.upper()))

@@ -1,5 +1,5 @@
-"""Limits of joints, and of spherical joints that stand for several R (:mod:`mechanism.tilt_limit`): whether a
-configuration asks for a coordinate or a turn beyond them, and the proof that every closure of a leg does."""
+"""Limits of joints, and of spherical joints that stand for several R (:mod:`.mechanism.tilt_limit`): tests of a
+configuration, and the proof that every solution of a leg is beyond them."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from .pinocchio_model import PinocchioModel
 SINGLE = (JointType.REVOLUTE, JointType.PRISMATIC)
 """Joints with one coordinate that may have limits."""
 AT_END = 1e-2
-"""Angle (rad) from the end of a wrist's interval within which it is named where a way ends."""
+"""Angle (rad) from the end of a tilt limit within which it is named where a path ends."""
 
 
 @dataclass(frozen=True, eq=False)
 class CoordinateIntervals:
-    """What stops the joints of a robot that moves on from a configuration: of each coordinate with limits the interval
-    (m, rad) of its coordinate. Turns are not counted modulo 2π on the way, but where the way begins: a coordinate
-    beyond the limits that a whole turn brings between them is taken as that one."""
+    """Limits of the coordinates of a robot that moves on from a configuration: of each coordinate with limits the
+    interval (m, rad). Rotations are not counted modulo 2π along the path, but at its start: a coordinate beyond the
+    limits that a whole turn brings between them is taken as that one."""
 
     spans: Mapping[str, tuple[float, float]]
 
     @classmethod
     def of(cls, model: PinocchioModel, q: Array) -> CoordinateIntervals:
-        """Those of a way that begins at q."""
+        """Return the intervals of a path that begins at q."""
         stops, joints, spans = model.mechanism.stops, model.mechanism.joints, dict[str, tuple[float, float]]()
         for name, value in coordinates(model, q).items():
             joint, _, *span = stops[name]
@@ -44,7 +44,8 @@ class CoordinateIntervals:
         return cls(spans)
 
     def margins(self, model: PinocchioModel, q: Array) -> dict[str, float]:
-        """How far each joint, and each wrist, is from the nearer limit (m, rad); negative beyond it."""
+        """Return the distance of each joint, and of each tilt limit, from the nearer limit (m, rad); negative beyond
+        it."""
         found = {
             name: min(value - lower, upper - value)
             for name, value in coordinates(model, q).items()
@@ -54,7 +55,8 @@ class CoordinateIntervals:
 
 
 def _about(value: float, lower: float, upper: float) -> tuple[float, float]:
-    """The interval of a turn, shifted by the whole turns that bring it nearest to a value; by none if it holds it."""
+    """Return the interval of a rotation, shifted by the whole turns that bring it nearest to a value; by none if it
+    contains it."""
     if lower - SAME_POINT <= value <= upper + SAME_POINT:
         return lower, upper
     turn = 2 * np.pi
@@ -65,7 +67,7 @@ def _about(value: float, lower: float, upper: float) -> tuple[float, float]:
 
 
 def coordinates(model: PinocchioModel, q: Array) -> dict[str, float]:
-    """The coordinate (m, rad) of each R or P that has limits, by the name that it has in the file."""
+    """Return the coordinate (m, rad) of each R or P that has limits, by the name that it has in the file."""
     step, joints = model.difference(model.q0, q), model.mechanism.joints
     return {
         name: float(step[model.coordinates[joint][place]]) * (model.length if joints[joint].type.slides else 1.0)
@@ -75,13 +77,13 @@ def coordinates(model: PinocchioModel, q: Array) -> dict[str, float]:
 
 
 def wrist_margins(model: PinocchioModel, q: Array) -> dict[str, float]:
-    """How far each wrist is from the nearer end of its interval (rad); negative beyond it."""
+    """Return the distance of each tilt from the nearer end of its interval (rad); negative beyond it."""
     return {name: _carried(model, q, name, wrist).margin() for name, wrist in model.mechanism.tilt_limits.items()}
 
 
 def flat_wrists(model: PinocchioModel, q: Array) -> dict[str, float]:
-    """Spherical joints that stand for several R whose axes nearly lie in a plane, where they turn in two ways only, and
-    how far they are from it (rad)."""
+    """Return the spherical joints that stand for several R whose axes are nearly in a plane, where they rotate in two
+    ways only, and their angle from it (rad)."""
     every = {
         name: _carried(model, q, name, joint.wrist).flatness()
         for name, joint in model.mechanism.joints.items()
@@ -98,13 +100,13 @@ def _carried(model: PinocchioModel, q: Array, name: str, wrist: TiltLimit) -> Ti
 
 
 def wrists_beyond(model: PinocchioModel, q: Array) -> list[str]:
-    """The wrists that would have to make a turn that they cannot."""
+    """Return the tilt limits that exclude the rotation of their joint."""
     return [name for name, margin in wrist_margins(model, q).items() if margin < -SAME_POINT]
 
 
 def outside(model: PinocchioModel, q: Array, joints: Sequence[str] | None = None) -> list[str]:
-    """Those joints (default: of all), turning or sliding about one axis, whose coordinates are outside their limits
-    (turns count modulo 2π), and the wrists beyond their intervals."""
+    """Return the joints (default: of all), rotating or translating about one axis, whose coordinates are outside their
+    limits (rotations modulo 2π), and the tilt limits that are exceeded."""
     mechanism = model.mechanism
     joints = [*mechanism.joints] if joints is None else joints
     return [name for name in wrists_beyond(model, q) if name in joints] + [
@@ -115,13 +117,14 @@ def outside(model: PinocchioModel, q: Array, joints: Sequence[str] | None = None
 
 
 def is_proved_outside(model: PinocchioModel, q: Array, bodies: Iterable[str], within: float) -> bool:
-    """Whether a joint has one value only, but for whole turns, and is beyond its limits: it joins two of these bodies,
-    whose poses are known to ``within`` (characteristic lengths, radians), or links that two parallel R join to them."""
+    """Return True if a joint has one value only, up to whole turns, and is beyond its limits: it joins two of these
+    links, whose poses are known to ``within`` (characteristic lengths, radians), or links that two parallel R join to
+    them."""
     mechanism, within = model.mechanism, max(within, OUT_OF_REACH)
     doubts = dict.fromkeys(bodies, (within * model.length, within))
 
     def doubt(joint: Joint, link: str) -> float:
-        """How far a joint's centre on a link can be from where it is (m)."""
+        """Return the error of a joint's centre on a link (m)."""
         shift, turn = doubts[link]
         return shift + turn * float(np.linalg.norm(mechanism.links[link].pose[:3, 3] - joint.point))
 
@@ -149,7 +152,7 @@ def is_proved_outside(model: PinocchioModel, q: Array, bodies: Iterable[str], wi
 
 
 def is_excluded(mechanism: Mechanism, joint: str, low: float, high: float) -> bool:
-    """Whether no coordinate from ``low`` to ``high`` is within a joint's limits, turns modulo 2π."""
+    """Return True if no coordinate from ``low`` to ``high`` is within a joint's limits, rotations modulo 2π."""
     if joint not in mechanism.stops:
         return False
     stop = mechanism.stops[joint]
@@ -162,7 +165,7 @@ def is_excluded(mechanism: Mechanism, joint: str, low: float, high: float) -> bo
 
 
 def all_excluded(mechanism: Mechanism, joint: str, values: Sequence[Any]) -> bool:
-    """Whether all values of a list, as balls, are outside a joint's limits."""
+    """Return True if all values of a list, as balls, are outside a joint's limits."""
     return all(
         value.is_finite() and is_excluded(mechanism, joint, float(value.lower()), float(value.upper()))
         for value in values
@@ -170,7 +173,7 @@ def all_excluded(mechanism: Mechanism, joint: str, values: Sequence[Any]) -> boo
 
 
 def at_end(at: ClosedConfiguration) -> str | None:
-    """The wrist nearest to an end of its interval, where it is there."""
+    """Return the tilt limit nearest to an end of its interval, if it is there."""
     name, margin = min(wrist_margins(at.model, at.q).items(), key=lambda item: item[1], default=(None, np.inf))
     return name if margin < AT_END else None
 
@@ -178,9 +181,9 @@ def at_end(at: ClosedConfiguration) -> str | None:
 def is_tilt_excluded(
     way: Sequence[MotionFactor], values: Mapping[str, Sequence[Any]], D: Array, within: float, alone: bool
 ) -> bool:
-    """Whether the wrist on a way is beyond its interval in all closures, as balls: of every other part that turns all
-    ``values`` are known, in one order where the way is ``alone``, and it ends displaced by D (4, 4), each number known
-    to ``within``."""
+    """Return True if the tilt limit on a path is exceeded in all solutions, as balls: of every other part that rotates
+    all ``values`` are known, in one order if the path is ``alone``, and it ends displaced by D (4, 4), each number
+    known to ``within``."""
     parts = [part for part in way if not part.slides]
     places = [i for i, part in enumerate(parts) if part.limit is not None]
     if len(places) != 1 or any(part.joint not in values for part in parts if part.limit is None):
@@ -196,7 +199,8 @@ def is_tilt_excluded(
 def _cosine(
     wrist: TiltLimit, before: Sequence[MotionFactor], after: Sequence[MotionFactor], turns: Sequence[Any], end: Field
 ) -> Any:
-    """E_1 … E_k first · D E_n⁻¹ … E_l⁻¹ last, for the parts before and after the wrist turned by ``turns``."""
+    """Return E_1 … E_k first · D E_n⁻¹ … E_l⁻¹ last, for the parts before and after the tilted joint rotated by
+    ``turns``."""
     first, last = (around(axis, SAME_GEOMETRY) for axis in (wrist.first, wrist.last))
     for part, q in reversed(list(zip(before, turns, strict=False))):
         first = part.rotated(first, q)
@@ -206,7 +210,7 @@ def _cosine(
 
 
 def _outside(wrist: TiltLimit, cosine: Any) -> bool:
-    """Whether a wrist is beyond its interval, by a ball of the cosine."""
+    """Return True if a tilt limit is exceeded, by a ball of the cosine."""
     return bool(
         (wrist.upper is not None and cosine < np.cos(wrist.upper) - SAME_POINT)
         or (wrist.lower is not None and cosine > np.cos(wrist.lower) + SAME_POINT)

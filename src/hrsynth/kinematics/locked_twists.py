@@ -1,9 +1,8 @@
-"""What a leg still allows its end when what is measured of it is held: the locked twist system T_i.
+"""Locked twist system T_i: the twists that a leg allows its end with fixed measured values.
 
 Computed from the screws of the leg's own joints, without the engine's Jacobians: an independent path to the same ranks.
-Lengths in characteristic lengths; twists at the base frame's origin, base axes.
-
-Source: docs/pages/theory.md, section 7.
+Lengths in characteristic lengths; twists at the base frame's origin, base axes. Source: docs/pages/theory.md, section
+7.
 """
 
 from __future__ import annotations
@@ -79,8 +78,8 @@ class _Bodies:
 
 
 def leg_twists(at: ClosedConfiguration, leg: Leg, locks: Sequence[Observation], reference: str) -> Array:
-    """An orthonormal basis (6, k) of T_i: the twists of the link on which the leg ends that its joints and held
-    measurements allow. Raises ``ValueError`` where a measurement is seen from a link outside the leg."""
+    """Return an orthonormal basis (6, k) of T_i: the twists of the link on which the leg ends that its joints and fixed
+    measured values allow. Raises ``ValueError`` if an observation is from a link outside the leg."""
     return leg_twists_together([at], leg, locks, reference)[0]
 
 
@@ -97,9 +96,8 @@ def leg_twists_together(
 
 
 def interaction(at: ClosedConfiguration, observation_model: ObservationModel) -> Array:
-    """Mᵀ on an orthonormal basis of the platform's twists, (rows, d), by the screws of all joints: u̇ = Mᵀ x.
-
-    Where observed links move while the platform rests, that part of u̇ is left out of it."""
+    """Return Mᵀ on an orthonormal basis of the platform's twists, (rows, d), by the screws of all joints: u̇ = Mᵀ x. If
+    observed links move while the platform is fixed, that part of u̇ is left out."""
     mechanism = at.model.mechanism
     links = [link for link in mechanism.links if link != mechanism.base]
     bodies = _Bodies(at, links, list(mechanism.joints.values()))
@@ -118,14 +116,13 @@ def interaction(at: ClosedConfiguration, observation_model: ObservationModel) ->
 def joint_at(
     at: ClosedConfiguration, joint: Joint, pose: Callable[[str], Array] | None = None
 ) -> tuple[Array, list[Array]]:
-    """Centre (characteristic lengths) and axes of a joint where a configuration, whose links are at these poses, has
-    them."""
+    """Return centre (characteristic lengths) and axes of a joint at a configuration, whose links are at these poses."""
     point, axes = carry_joint(at.model.mechanism, joint, pose or at.pose)
     return point / at.model.length, axes
 
 
 def carry_joint(mechanism: Mechanism, joint: Joint, pose: Callable[[str], Array]) -> tuple[Array, list[Array]]:
-    """Centre (m) and axes of a joint, carried by links that are at these poses (4, 4)."""
+    """Return centre (m) and axes of a joint, carried by links that are at these poses (4, 4)."""
 
     carriers = [pose(link) @ mechanism.links[link].inverse for link in joint.links[: max(1, len(joint.axes))]]
     axes = [D[:3, :3] @ axis for D, axis in zip(carriers, joint.axes, strict=False)]
@@ -133,7 +130,7 @@ def carry_joint(mechanism: Mechanism, joint: Joint, pose: Callable[[str], Array]
 
 
 def rezero(at: ClosedConfiguration) -> Mechanism:
-    """The same mechanism with ``at`` as its zero configuration."""
+    """Return the mechanism with ``at`` as its zero configuration."""
     mechanism, model = at.model.mechanism, at.model
     step = model.difference(model.q0, at.q)
     known = {
@@ -146,8 +143,8 @@ def rezero(at: ClosedConfiguration) -> Mechanism:
 
 @dataclass(frozen=True, eq=False)
 class Split:
-    """A twist system taken apart at a point B: the translations in it, (3, k), the rotations about axes through B in
-    it, (3, m), and whether that is all of it."""
+    """Twist system decomposed at a point B: the translations in it, (3, k), the rotations about axes through B in it,
+    (3, m), and whether that is all of it."""
 
     translations: Array
     rotations: Array
@@ -155,7 +152,7 @@ class Split:
 
 
 def split(twists: Array, point: Array) -> Split:
-    """Take a twist system (6, k) apart at a point (3,)."""
+    """Decompose a twist system (6, k) at a point (3,)."""
     return split_together([twists], [point])[0]
 
 

@@ -21,7 +21,7 @@ SIZE = 12
 """Numbers of a placement: three axes, then the point."""
 _AXES, _POINT = np.arange(9).reshape(3, 3), np.arange(9, 12)
 _ONE, _ZERO = 0, 1
-"""Where a placement has them; where that of the world has a 1 and a 0."""
+"""Index where a placement has them; where that of the world has a 1 and a 0."""
 _NEXT, _LAST = [1, 2, 0], [2, 0, 1]
 _NOTHING = np.zeros(0)
 
@@ -36,7 +36,7 @@ def numbers(placements: Sequence[pin.SE3]) -> Array:
 
 
 class LoopRows:
-    """Of loops between two frames of a model, balls or not; ``supports`` says what moves a body (nv,)."""
+    """Rows of loops between two frames of a model, spherical or not; ``supports`` (nv,) marks what moves a body."""
 
     def __init__(
         self, model: pin.Model, data: pin.Data, loops: Sequence[tuple[int, int, bool]], supports: Callable[[int], Array]
@@ -92,8 +92,8 @@ class LoopRows:
 
 
 def _product(take: Callable[..., Array], forces: Places, screws: Array, signs: Array) -> Callable[[], Array]:
-    """What the forces at these places do on the screws that move a loop's far end (sign 1) or its near end (−1). What
-    is the same in each call is bound here: to look it up would take a tenth of the time."""
+    """Return the work of the forces at these places on the screws that move a loop's far end (sign 1) or its near end
+    (−1). Constants of all calls are bound here: to look them up would take a tenth of the time."""
     parts = np.empty(forces.shape)
     left, right = parts[1:3], parts[3:]
     moments, less = left

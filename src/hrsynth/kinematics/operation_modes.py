@@ -1,7 +1,7 @@
-"""Which operation mode samples are of, and the mechanisms that have none to draw (docs/pages/theory.md, section 5).
+"""Operation mode of samples, and the mechanisms that have none (docs/pages/theory.md, section 5).
 
-A zero configuration may be a branch point, or one at which nothing moves to first order; loops may be shaky. What is
-refused is said with what was seen.
+A zero configuration may be a branch point, or one at which nothing moves to first order; loops may be infinitesimally
+mobile. Refusals report what was found.
 """
 
 from __future__ import annotations
@@ -31,25 +31,26 @@ from .velocity_relation import ObservationModel, relation
 from .walking import HALVED, any_velocity, random_walk, step_along
 
 ASKED = 40
-"""Configurations beyond a singularity that are asked whether they may be of another operation mode."""
+"""Largest number of configurations beyond a singularity that are tested for another operation mode."""
 MET = 6
-"""How many of those that may are confirmed by walks from there."""
+"""Largest number of those that are confirmed by walks from there."""
 BEYOND = 16
-"""Steps of such a walk."""
+"""Number of steps of such a walk."""
 LEAVING = 24
-"""Steps in random directions by which the branches at a singular zero configuration are sought."""
+"""Number of steps in random directions by which the branches at a singular zero configuration are sought."""
 SHAKEN = 3
-"""Samples at which a mechanism is seen to be shaky before it is said to be."""
+"""Number of samples at which a mechanism must be infinitesimally mobile to be reported so."""
 NAMED = 6
-"""Links that a refusal names."""
+"""Largest number of links that a refusal names."""
 STEPS = 4
-"""Steps from the zero configuration to a sample."""
+"""Number of steps from the zero configuration to a sample."""
 
 
 def other_modes(
     beyond: Sequence[ClosedConfiguration], own: Signature, observation_model: ObservationModel
 ) -> tuple[OperationMode, ...]:
-    """The operation modes other than one's own to which configurations belong, each confirmed by walks from there."""
+    """Return the operation modes other than one's own to which configurations belong, each confirmed by walks from
+    there."""
     some = beyond[:: max(1, len(beyond) // ASKED)]
     strange = [at for at in some if (each := mode_at(at, observation_model)) and not each.signature.agrees(own)]
     found = group_modes(
@@ -63,7 +64,7 @@ def other_modes(
 
 
 def mode_at(at: ClosedConfiguration, observation_model: ObservationModel) -> OperationMode | None:
-    """The operation mode that a configuration shows; None where its ranks are not clear, as beside a singularity."""
+    """Return the operation mode of a configuration; None if its ranks are not clear, as near a singularity."""
     if (steady := well_closed(at)) is None or steady.kernel()[1].dropped > EXACT:
         return None
     try:
@@ -76,9 +77,9 @@ def mode_at(at: ClosedConfiguration, observation_model: ObservationModel) -> Ope
 def ways_out(
     start: ClosedConfiguration, observation_model: ObservationModel, rng: np.random.Generator, *, singular: bool
 ) -> list[ClosedConfiguration]:
-    """Configurations beside a ``singular`` zero configuration, or beside one at which nothing that is asked moves to
-    first order (a dead centre); raises ``BranchPoint`` where they are not of one mode, ``BadMechanism`` where nothing
-    that is asked moves there either."""
+    """Return configurations near a ``singular`` zero configuration, or near one at which nothing observed moves to
+    first order (a dead centre); raises ``BranchPoint`` if they are not of one mode, ``BadMechanism`` if nothing
+    observed moves there either."""
     found = [
         each
         for _ in range(LEAVING)
@@ -109,16 +110,15 @@ def _refuse_unmoved(found: Sequence[ClosedConfiguration]) -> None:
     ]
     named = ", ".join(moving[:NAMED]) + (f" and {len(moving) - NAMED} more" if moving[NAMED:] else "")
     raise BadMechanism(
-        f"{mechanism.name}: neither the platform nor a watched segment moves, but other links do "
+        f"{mechanism.name}: neither the platform nor an observed segment moves, but other links do "
         f"({named}; mobility {found[0].kernel()[0].shape[1]})",
-        None,
-        "a platform or a watched segment that moves (--observe LINK)",
+        remedy="Observe a link that moves, with --observe LINK.",
     )
 
 
 def require_motions(found: Sequence[ClosedConfiguration]) -> None:
-    """Raise ``Shaky`` where ker A is larger than the tangent space of what closes, all along: so where loops repeat
-    each other to first order and not beyond (docs/pages/theory.md, section 1)."""
+    """Raise ``InfinitesimalMobility`` if ker A is larger than the tangent space of the closed configurations, at all
+    samples: so if loops repeat each other to first order and not beyond (docs/pages/theory.md, section 1)."""
     done = 0
     for at in sorted(found, key=lambda each: -each.kernel()[1].weakest)[:SHAKEN]:
         mobility = at.kernel()[0].shape[1]
@@ -130,8 +130,8 @@ def require_motions(found: Sequence[ClosedConfiguration]) -> None:
 
 
 def ways_on(at: ClosedConfiguration) -> int | None:
-    """In how many independent ways small steps along ker A lead to closed configurations; None where one does not
-    close. Where no constraint is redundant that is the mobility."""
+    """Return the number of independent ways in which small steps along ker A lead to closed configurations; None if one
+    does not close. If no constraint is redundant that is the mobility."""
     model, (kernel, rank) = at.model, at.kernel()
     if rank.value == len(model.residual(at.q)):
         return kernel.shape[1]
@@ -158,7 +158,7 @@ def require_one(groups: Sequence[Sequence[OperationMode]], observation_model: Ob
 
 
 def far_walks(start: ClosedConfiguration, steps: int = STEPS) -> list[ClosedConfiguration]:
-    """The configurations of two random walks in all of the mechanism's freedoms, the second half of each."""
+    """Return the configurations of two random walks in all motions of the mechanism, the second half of each."""
     try:
         walk = list(random_walk(start, 2 * steps, steps=steps))
     except NotSampled:
@@ -172,18 +172,18 @@ def firmest(found: Sequence[ClosedConfiguration]) -> ClosedConfiguration:
 
 
 def well_closed(here: ClosedConfiguration) -> ClosedConfiguration | None:
-    """The same configuration, its loops closed so well that T_qC does not turn by the residual; None where numbers do
-    not allow that, near a singularity."""
+    """Return the configuration with its loops closed so well that T_qC does not rotate by the residual; None if numbers
+    do not allow that, near a singularity."""
     if here.residual <= STEADY_TANGENT * here.kernel()[1].weakest ** 2:
         return here
     model = here.model
     here = ClosedConfiguration.of(model, solve(model, here.q, tolerance=SHARP, iterations=5)[0])
     aside, _ = kernel_basis(model.jacobian(model.integrate(here.q, NUDGE * here.loops.right[:, -1])))
-    turn = largest_angle(here.kernel()[0], aside) / NUDGE  # radians for each unit of the weakest direction
+    turn = largest_angle(here.kernel()[0], aside) / NUDGE  # radians for each unit of the least mobile direction
     return here if turn * max(here.residual, SHARP) / here.strengths[-1] <= STEADY_TANGENT else None
 
 
 def is_regular(start: ClosedConfiguration, rng: np.random.Generator) -> bool:
-    """Whether some step from a configuration, however short, follows its branch: not so where branches meet."""
+    """Return True if some step from a configuration, however short, follows its branch: not so where branches meet."""
     velocity = any_velocity(start, rng)
     return any(step_along(start, velocity, part) is not None for part in (*HALVED[::3], 1e-4, 1e-5))

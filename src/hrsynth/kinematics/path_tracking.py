@@ -1,4 +1,4 @@
-"""A twin led along ways: each configuration solved for from the one before."""
+"""Path tracking of a model: each configuration is solved from the one before."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from .tasks import PoseAndValuesTask, TaskBatch, solve_together
 def track_paths(
     model: PinocchioModel, ways: Sequence[Sequence[PoseAndValuesTask]], iterations: int = 120
 ) -> Iterator[tuple[Array, float] | UndefinedValue]:
-    """The configurations a twin reaches when it is led from its zero configuration along ways, and the residuals, or
-    what cannot be measured on a way; all ways in step, or each alone where that is so of one."""
+    """Track paths from the zero configuration: yield (q, closure residual) of each path, or its UndefinedValue; all
+    paths in step, or each alone if a value is undefined on one."""
     try:
         yield from _track_ways(model, ways, iterations)
     except UndefinedValue as error:
@@ -28,7 +28,7 @@ def track_paths(
 def _track_ways(
     model: PinocchioModel, ways: Sequence[Sequence[PoseAndValuesTask]], iterations: int
 ) -> list[tuple[Array, float]]:
-    longest = max(map(len, ways))  # a shorter way ends with its last target, again and again
+    longest = max(map(len, ways))  # a shorter path ends with its last target, again and again
     found, stages = (
         [(model.q0, 0.0)] * len(ways),
         list(zip(*([*way, *[way[-1]] * (longest - len(way))] for way in ways), strict=True)),

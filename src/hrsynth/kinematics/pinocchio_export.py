@@ -1,4 +1,4 @@
-"""A mechanism for Pinocchio alone: the file's tree in metres, its loops as Pinocchio's own constraints.
+"""Export of a mechanism to Pinocchio alone: the file's tree in metres, its loops as Pinocchio's own constraints.
 
 The frame of a joint lies at its centre, turned as the link that it carries. :mod:`.pinocchio_model`, with which this
 project computes, has a tree, a zero and a unit of length of its own.
@@ -27,36 +27,55 @@ _WHOLE = {JointType.SPHERICAL: pin.JointModelSpherical, JointType.FREE: pin.Join
 
 
 class PinocchioExport(NamedTuple):
-    """What Pinocchio needs of a mechanism (metres, kilograms, radians)."""
+    """Pinocchio model of a mechanism with its constraint models (metres, kilograms, radians)."""
 
     model: pin.Model
-    """The tree, and a leaf for each loop that is cut through its joint; links are BODY frames. Bodies without a mass in
-    the file, leaves and the parts of U, C and E between two axes among them, have none: their forward dynamics need
+    """Tree, and a leaf for each loop that is cut through its joint; links are BODY frames. Bodies without a mass in
+    the file, such as leaves and the parts of U, C and E between two axes, have none: their forward dynamics need
     ``model.armature``."""
     constraint_models: list[pin.RigidConstraintModel]
-    """One a loop: ``CONTACT_3D`` holds the two points of a ball together, ``CONTACT_6D`` welds a leaf to its link."""
+    """One for each loop: ``CONTACT_3D`` for a spherical joint, ``CONTACT_6D`` welds a leaf to its link."""
     q0: Array
-    """The zero configuration of the mechanism, at which all loops are closed, as the file counts (nq,)."""
+    """Zero configuration of the mechanism, at which all loops are closed, relative to the file's zero (nq,)."""
     joints: dict[str, tuple[str, ...]]
-    """The joints of the file, each with the names of the model's joints that it is: S and floating joints are one,
-    fixed joints and balls that close a loop none, others one an axis."""
+    """Joints of the file with the names of their joints in the model: one for S and floating joints, none for fixed
+    joints and spherical loop closures, one for each axis of others."""
     motors: tuple[str, ...]
-    """Names of the model's joints that motors drive."""
+    """Names of the model's actuated joints."""
     closures: tuple[str, ...]
-    """Names of the file's joints that the constraint models are."""
+    """Names of the file's joints that the constraint models represent."""
     couplings: Array
-    """Gears, which no constraint model says, (gears, nv): ``couplings @ v = 0``, and
+    """Couplings, for which there is no constraint model, (couplings, nv): ``couplings @ v = 0``, and
     ``couplings @ pin.difference(model, q0, q) = 0``."""
 
 
 @with_spelling
 def to_pinocchio(robot: Mechanism | str | Path) -> PinocchioExport:
-    """The robot, with the loops that it closes, as what Pinocchio computes with: ``Mechanism.to_pinocchio()``.
+    """Export a robot with its loops to Pinocchio; also as ``Mechanism.to_pinocchio()``.
 
-    Coordinates count from the file's zero in the file's sense, joints and links have the file's names, and bounds,
-    masses and inertias are set where the file has them; a U is two revolute joints (``hip__1``, ``hip__2``), C and E
-    are such chains too. Gravity is 9.81 m/s² against the z axis of the base link: ``model.gravity`` sets another.
+    Parameters
+    ----------
+    robot
+        Mechanism, path of a file, or name of a shipped robot.
 
+    Returns
+    -------
+    PinocchioExport
+        Model, constraint models, zero configuration (nq,), names and couplings (metres, kilograms, radians).
+
+    Raises
+    ------
+    BadRobotFile, LoopsNotClosed
+        If the robot is not readable, or its loops do not close.
+
+    Notes
+    -----
+    Coordinates are relative to the file's zero, in the file's sense; joints and links have the file's names. Bounds,
+    masses and inertias are set if the file has them. A U is two revolute joints (``hip__1``, ``hip__2``), C and E are
+    such chains too. Gravity is 9.81 m/s² against the z axis of the base link; ``model.gravity`` sets another.
+
+    Examples
+    --------
     >>> model, constraints, q0, *names = hrsynth.to_pinocchio("3rrr_m1")
     >>> model.nq, len(constraints)
     (9, 2)
@@ -114,11 +133,12 @@ class _Export:
         )
 
     def _carried(self, link: str) -> list[Joint]:
-        """The joints to be added on a link, the last one first: those of the tree and those that end in a leaf."""
+        """Return the joints to be added on a link, the last one first: those of the tree and those that end in a
+        leaf."""
         return [each for each in self._robot.joints_of(link)[::-1] if each.predecessor == link and not _is_ball(each)]
 
     def _order(self, joint: Joint) -> int:
-        """-1 where a U is passed against its direction, from its second axis to its first."""
+        """Return -1 if a U is passed against its direction, from its second axis to its first."""
         given = self._given.joints.get(joint.name, joint)
         return -1 if joint.type is JointType.UNIVERSAL and given.predecessor != joint.predecessor else 1
 
@@ -169,12 +189,12 @@ class _Export:
         return body, frame
 
     def _start(self, joint: str, place: int = 0) -> tuple[int, int]:
-        """Where the coordinates of a part of a joint start in q and in v."""
+        """Return the start indices in q and in v of a part of a joint."""
         own = self._model.joints[self._model.getJointId(self._joints[joint][place])]
         return own.idx_q, own.idx_v
 
     def _bound(self) -> None:
-        """The limits that the file has; those of a U, C or E, one for all its axes, count from the file's zero."""
+        """Set the limits that the file has; those of a U, C or E, one for all its axes, count from the file's zero."""
         model = self._model
         for name, joint in self._robot.joints.items():
             for place in range(0 if joint.type in _WHOLE else len(self._joints.get(name, ()))):
@@ -195,7 +215,7 @@ class _Export:
                         bounds[index] = start + sign * value
 
     def _gears(self) -> Array:
-        """One row a coupling: the driven joint's rate − ratio × the driving one's."""
+        """Return one row a coupling: the driven joint's rate − ratio × the driving one's."""
         rows = np.zeros((len(self._robot.couplings), self._model.nv))
         for row, coupling in zip(rows, self._robot.couplings, strict=True):
             for link, factor in ((coupling.successor, 1.0), (coupling.predecessor, -coupling.ratio)):
@@ -204,7 +224,7 @@ class _Export:
 
 
 def _is_ball(joint: Joint) -> bool:
-    """Whether a loop holds two points together, and no motor turns it."""
+    """Return True if a loop joins two points, and no motor rotates it."""
     return joint.type is JointType.SPHERICAL and not joint.in_tree and not joint.actuated
 
 

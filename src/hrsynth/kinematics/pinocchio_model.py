@@ -1,9 +1,9 @@
-"""The Pinocchio twin of a mechanism: a spanning tree and exact loop constraints for every joint type.
+"""Pinocchio model of a mechanism: a spanning tree and exact loop constraints for every joint type.
 
-The twin measures lengths in characteristic lengths of the mechanism it was given (``length``), so that its Jacobians
-mix no metres with radians. Every tree joint's frame has the base's orientation at the zero configuration. A spherical
-loop holds two points together; any other loop is cut through the joint: the joint is added as a leaf and the leaf
-welded to the other link (:mod:`.loop_rows`).
+Lengths are in characteristic lengths of the given mechanism (``length``), so that Jacobians mix no metres with radians.
+Every tree joint's frame has the base's orientation at the zero configuration. A spherical loop joins two points; any
+other loop is cut through the joint: the joint is added as a leaf and the leaf welded to the other link
+(:mod:`.loop_rows`).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _WEIGHT = {"F": 0, "R": 1, "P": 1, "C": 2, "U": 2, "E": 3, "S": 4, "6": 100}
 
 
 class PinocchioModel:
-    """A Pinocchio model of a mechanism; ``at(q)`` brings its kinematics up to date."""
+    """Pinocchio model of a mechanism; ``at(q)`` brings its kinematics up to date."""
 
     def __init__(self, mechanism: Mechanism, length: float | None = None) -> None:
         self.mechanism = mechanism
@@ -44,7 +44,7 @@ class PinocchioModel:
             self._add_tree(joint, parent)
         ends = [self._loop(joint) for joint in loops]
         self.spanned = tuple(joint for joint, _ in tree), tuple(loops)
-        """The joints of the tree, from the base outwards, and those at which loops are cut."""
+        """Joints of the tree, from the base outwards, and those at which loops are cut."""
         self._gears = self._gear_rows()
         self._geared = len(self._gears) > 0
         if self.model.nv > LARGEST_MODEL:
@@ -61,7 +61,7 @@ class PinocchioModel:
         self._rows = LoopRows(self.model, self.data, ends, self._supports)
         self._q: Array | None = None
         self.measured: tuple[tuple[object, ...], Array, tuple[Array, Array, list[Array], list[Array]]] | None = None
-        """What was measured last: what was asked, where, and the answer."""
+        """Last measured values: their observations, configuration and result."""
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self.mechanism.name}>"
@@ -117,12 +117,18 @@ class PinocchioModel:
         if len(ordered) != len(mechanism.links) - 1:
             reached = {mechanism.base, *(child.other(parent) for child, parent in ordered)}
             missing = sorted(set(mechanism.links) - reached)
-            raise BadMechanism(f"{mechanism.name}: links that no joint connects to the base", ", ".join(missing))
+            raise BadMechanism(
+                f"{mechanism.name}: links that no joint connects to the base",
+                ", ".join(missing),
+                remedy="Connect each to another link.",
+            )
         used = {joint.name for joint, _ in ordered}
         driven = ", ".join(name for name in mechanism.idle if mechanism.joints[name].actuated)
         if driven:
             raise BadMechanism(
-                f"{mechanism.name}: a motor on a floating joint whose link other joints hold", driven, "motors on those"
+                f"{mechanism.name}: a motor on a floating joint whose link other joints hold",
+                driven,
+                remedy="Put the motors on these joints.",
             )
         return ordered, [joint for joint in joints if joint.name not in used]
 
@@ -193,11 +199,11 @@ class PinocchioModel:
         return rows
 
     def parts(self) -> list[tuple[Joint, str, tuple[str, ...]]]:
-        """The joints of the tree and the cut ones: each with the link it is seen from and the names of its parts."""
+        """Return the joints of the tree and the cut ones: each with its link and the names of its parts."""
         return list(self._parts)
 
     def start(self, part: str) -> int:
-        """Where the coordinates of a joint's part start in q."""
+        """Return the start index in q of a joint's part."""
         return int(self.model.joints[self.model.getJointId(part)].idx_q)
 
     def at(self, q: Array) -> None:
@@ -215,11 +221,11 @@ class PinocchioModel:
         return np.concatenate([errors, self._gear_errors(q)]) if self._geared else errors
 
     def _gear_errors(self, q: Array) -> Array:
-        """What the gears leave over."""
+        """Return the residuals of the couplings."""
         return np.asarray(self._gears @ pin.difference(self.model, self.q0, q))
 
     def gear_errors(self, q: Array) -> dict[str, float]:
-        """What each coupling leaves over (m, rad)."""
+        """Return the residual of each coupling (m, rad)."""
         return dict(zip((each.name for each in self.mechanism.couplings), self._gear_errors(q).tolist(), strict=True))
 
     def jacobian(self, q: Array) -> Array:
@@ -230,12 +236,12 @@ class PinocchioModel:
 
     @property
     def blocks(self) -> tuple[tuple[str, ...], tuple[int, ...]]:
-        """What the rows of :meth:`jacobian` belong to: names of loops, then of couplings, and rows of each."""
+        """Owners of the rows of :meth:`jacobian`: names of loops, then of couplings, and rows of each."""
         gears = tuple(coupling.name for coupling in self.mechanism.couplings)
         return (*self.loops, *gears), (*self._rows.sizes, *[1] * len(gears))
 
     def worst_loop(self, q: Array) -> tuple[str, float]:
-        """The loop that misses most, and by how much."""
+        """Return the loop with the largest residual, and that residual."""
         parts = np.split(self.residual(q), np.cumsum(self._rows.sizes))
         misses = [(float(np.linalg.norm(part)), name) for part, name in zip(parts, self.loops, strict=False)]
         miss, name = max(misses, default=(0.0, "none"))
@@ -284,8 +290,8 @@ class PinocchioModel:
     def states(
         self, places: Sequence[Array], links: tuple[str, ...], whole: int | None = None
     ) -> tuple[Array, Array, Array, Array]:
-        """Of several configurations :meth:`residual` (n, rows), :meth:`jacobian` (n, rows, nv) and :meth:`frames`
-        (n, k, 4, 4), (n, k, 6, nv)."""
+        """Return :meth:`residual` (n, rows), :meth:`jacobian` (n, rows, nv) and :meth:`frames` (n, k, 4, 4), (n, k, 6,
+        nv) of several configurations."""
         bodies = (self._several.get(links) or self._together(links))[0] if links else np.zeros(0, dtype=np.intp)
         rows = self._rows
         numbers, missed, loops, J, X = [], [], [], [], []
@@ -313,7 +319,8 @@ class PinocchioModel:
         return X
 
     def _together(self, links: tuple[str, ...]) -> tuple[Places, Array, Array]:
-        """Of several links: the bodies that carry them, where (k, 4, 4), and what moves them (k, 1, nv)."""
+        """Return the bodies that carry several links, their placements (k, 4, 4), and the marks of what moves them (k,
+        1, nv)."""
         bodies = [self._links[link][0] for link in links]
         offsets = np.array([self._links[link][1] for link in links])
         masks = np.array([self._supports(body) for body in bodies])[:, None, :]
@@ -358,7 +365,7 @@ class PinocchioModel:
         return pin.integrate(self.model, q, step)
 
     def is_normalized(self, q: Array) -> bool:
-        """Whether all turns in ``q`` are unit quaternions."""
+        """Return True if all rotations in ``q`` are unit quaternions."""
         return bool(pin.isNormalized(self.model, q, SAME_GEOMETRY))
 
     def difference(self, q: Array, other: Array) -> Array:

@@ -1,6 +1,6 @@
-"""What a platform generically does, and goals for it: parts of its pose, each with its error and Jacobian.
+"""Generic motion of a platform, and pose tasks for it: parts of its pose, each with its error and Jacobian.
 
-Lengths in characteristic lengths, so that positions and turns mix; base axes throughout.
+Lengths in characteristic lengths, so that positions and rotations mix; base axes throughout.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from .velocity_relation import ObservationModel, relation
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PoseTask(Value):
-    """Parts of the pose of ``link`` that are wanted: ``directions`` (k, 3) · position of ``point`` = ``values`` (k,)
-    metres, the turn ``phi`` about ``normal`` since the orientation ``zero``, the whole orientation ``rotation``, or
-    (``axis``) no turn but about that base direction. The point is given in the link's frame."""
+    """Desired parts of the pose of ``link``: ``directions`` (k, 3) · position of ``point`` = ``values`` (k,) metres,
+    the rotation ``phi`` about ``normal`` since the orientation ``zero``, the whole orientation ``rotation``, or
+    (``axis``) no rotation but about that base direction. The point is given in the link's frame."""
 
     link: str
     point: Array
@@ -40,7 +40,7 @@ class PoseTask(Value):
     axis: Array | None = None
 
     def error_and_jacobian(self, model: PinocchioModel, q: Array) -> tuple[Array, Array]:
-        """Error (reached − wanted) and its Jacobian, (rows,) and (rows, nv)."""
+        """Return the error (reached − desired) and its Jacobian, (rows,) and (rows, nv)."""
         frames, velocities = model.frames(q, (self.link,))
         X, V = frames[0], velocities[0]
         R = X[:3, :3]
@@ -61,8 +61,8 @@ class PoseTask(Value):
         return np.concatenate(errors), np.vstack(blocks)
 
     def is_met(self, X: Array, tolerance: float) -> bool:
-        """Whether the pose X (4, 4) of the link is one that is wanted, to a difference of positions (m) and of rotation
-        matrices: no error vanishes at another pose unseen."""
+        """Return True if the pose X (4, 4) of the link is a desired one, to a difference of positions (m) and of
+        rotation matrices: no error vanishes unnoticed at another pose."""
         R = X[:3, :3]
         apart = [self.directions @ (R @ self.point + X[:3, 3]) - self.values]
         if self.phi is not None:
@@ -76,11 +76,11 @@ class PoseTask(Value):
 
     @property
     def lengths(self) -> int:
-        """How many of the rows are lengths; they come first."""
+        """Number of rows that are lengths; they come first."""
         return len(self.values)
 
     def towards(self, X: Array, fraction: float) -> PoseTask:
-        """The goal that lies ``fraction`` of the way from the pose X (4, 4) to this one."""
+        """Return the task at ``fraction`` of the path from the pose X (4, 4) to this one."""
         if fraction >= 1:
             return self
         R, here = X[:3, :3], transform(X, self.point)
@@ -97,7 +97,7 @@ class PoseTask(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PlatformMotion(Value):
-    """What a platform does at generic configurations, relative to its pose ``home`` (4, 4) at the zero configuration.
+    """Motion of a platform at generic configurations, relative to its pose ``home`` (4, 4) at the zero configuration.
 
     ``translations`` (3, k) spans the velocities of ``point`` (in the platform's frame), ``rotations`` (3, m) the
     angular velocities that count (none of a point body), ``twists`` (6, n) both together.
@@ -106,21 +106,21 @@ class PlatformMotion(Value):
     link: str
     point: Array
     body: bool
-    """Whether the platform's turn counts: not that of a point body."""
+    """True if the platform's rotation counts: not that of a point body."""
     home: Array
     translations: Array
     rotations: Array
     twists: Array
     dof: int
-    """Freedoms at a generic configuration; ``twists`` spans more where they change from pose to pose."""
+    """Platform dof at a generic configuration; ``twists`` spans more where they change from pose to pose."""
     shifts: int
-    """Those of the point there: 1 on a curve, 2 on a surface; ``translations`` spans all."""
+    """Dof of the point there: 1 on a curve, 2 on a surface; ``translations`` spans all."""
     form: PoseForm = RADIANS
-    """How poses are told."""
+    """Format of poses."""
 
     @classmethod
     def of(cls, configurations: Iterable[ClosedConfiguration], observation_model: ObservationModel) -> PlatformMotion:
-        """The motion that generic configurations show."""
+        """Return the motion that generic configurations show."""
         asked = observation_model.of_platform
         point = np.zeros(3) if observation_model.point is None else observation_model.point
         columns = []
@@ -157,24 +157,24 @@ class PlatformMotion(Value):
 
     @property
     def planar(self) -> bool:
-        """Whether it is free in a plane: two translations and the turn about their normal."""
+        """True if it moves freely in a plane: two translations and the rotation about their normal."""
         return (self.translations.shape[1], self.rotations.shape[1], self.dof) == (2, 1, 3)
 
     @property
     def turns_once(self) -> bool:
-        """Whether all that it turns is phi."""
+        """True if its only rotation is phi."""
         return self.rotations.shape[1] == 1 and abs(float(self.normal @ self.rotations[:, 0])) > 1 - RANK_CUTOFF
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """The parts of a pose that the platform can change."""
+        """Parts of a pose that the platform can change."""
         found = [name for name, row in zip("xyz", self.translations, strict=True) if np.linalg.norm(row) > RANK_CUTOFF]
         if np.linalg.norm(self.normal @ self.rotations) > RANK_CUTOFF:
             found.append("phi")
         return (*found, "rpy") if self.rotations.shape[1] else tuple(found)
 
     def free(self, given: Collection[str]) -> tuple[str, ...]:
-        """What is left of a pose of which these parts are given, in words."""
+        """Return the parts of a pose that are not given, as text."""
         turned = self.rotations.shape[1] if "rpy" in given else int("phi" in given)
         if sum(name in "xyz" for name in given) + turned >= self.dof:
             return ()
@@ -190,8 +190,8 @@ class PlatformMotion(Value):
         return transform(X, self.point)
 
     def pose(self, X: Array) -> Pose:
-        """A platform pose X (4, 4) as a user writes it; of a point body the position alone, of one that turns about one
-        axis that turn, as phi in degrees."""
+        """Return a platform pose X (4, 4) as a user writes it; of a point body the position alone, of one that rotates
+        about one axis that rotation, as phi in degrees."""
         found = Pose.of(X, None if self.body else self.point)
         if found.rotation is None or (self.form == RADIANS and not self.turns_once):
             return found
@@ -202,28 +202,29 @@ class PlatformMotion(Value):
         return replace(found, shown=write_parts(parts, self.form.degrees or "phi" in parts))
 
     def goal(self, pose: Pose, robot: str = "the robot") -> PoseTask:
-        """The goal that a pose asks for; raises ``BadRequest`` for parts that the platform cannot change."""
+        """Return the task of a pose that a user gives; raises ``BadRequest`` for parts that the platform cannot
+        change."""
         constant = [name for name in pose.given if name not in self.parts]
         for name in constant:
             if not self._as_at_home(pose, name):
-                raise BadRequest(f"{robot}: the platform cannot change {name}", str(pose), self.parts or "no part")
+                raise BadRequest(f"{robot}: the platform cannot change {name}", str(pose), self.parts)
         pose = pose.without(constant)
         normal, phi, rotation = self.normal, pose.phi, pose.rotation
         if rotation is not None and self.rotations.shape[1] == 1:
             turn, normal = rotation @ self.home[:3, :3].T, self.rotations[:, 0]
             phi, rotation = turn_about(normal, turn)[0], None
             if np.linalg.norm(turn @ normal - normal) > AS_PRINTED:
+                axis = " ".join(f"{x:.4g}" for x in self.rotations[:, 0])
                 raise BadRequest(
-                    f"{robot}: the platform turns about one axis only, rpy is not such a turn",
-                    str(pose),
-                    "phi, or a turn about " + " ".join(f"{x:.4g}" for x in self.rotations[:, 0]),
+                    f"{pose}: the platform of {robot} rotates about one axis only",
+                    remedy=f"Use phi, or a rotation about {axis}.",
                 )
         placed = [i for i, name in enumerate("xyz") if name in pose.given]
         values = np.array([getattr(pose, "xyz"[i]) for i in placed], dtype=float)
         return PoseTask(self.link, self.point, self.home[:3, :3], np.eye(3)[placed], values, normal, phi, rotation)
 
     def pose_of(self, goal: PoseTask) -> Array:
-        """The platform pose (4, 4) that a goal asks for, its free parts as near to home as they can be."""
+        """Return the platform pose (4, 4) of a task, its free parts as near to ``home`` as they can be."""
         X, home = self.home.copy(), self.position(self.home)
         if goal.rotation is not None:
             X[:3, :3] = goal.rotation
@@ -235,7 +236,7 @@ class PlatformMotion(Value):
         return X
 
     def is_placed(self, goal: PoseTask) -> bool:
-        """Whether a goal leaves the point no translation."""
+        """Return True if a task leaves the point no translation."""
         k = self.translations.shape[1]
         return not k or (
             len(goal.values) > 0
@@ -243,18 +244,19 @@ class PlatformMotion(Value):
         )
 
     def turns_left(self, goal: PoseTask) -> int:
-        """How many of the platform's turns a goal leaves free."""
+        """Return the number of the platform's rotations that a task leaves free."""
         return 0 if goal.rotation is not None else self.rotations.shape[1] - (goal.phi is not None)
 
     def _as_at_home(self, pose: Pose, name: str) -> bool:
-        """Whether a part that never changes is given as it is at the zero configuration, to the digits printed."""
+        """Return True if a part that never changes is given as it is at the zero configuration, to the digits
+        printed."""
         if name in "xyz":
             here = self.position(self.home)["xyz".index(name)]
             return abs(float(getattr(pose, name)) - float(here)) <= AS_PRINTED
         return pose.rotation is not None and float(np.linalg.norm(pose.rotation - self.home[:3, :3])) <= AS_PRINTED
 
     def at_home(self) -> PoseTask:
-        """The goal of the whole pose at the zero configuration: what free parts are nearest to."""
+        """Return the task of the whole pose at the zero configuration: free parts are nearest to it."""
         R = self.home[:3, :3]
         return PoseTask(
             self.link,
@@ -267,12 +269,12 @@ class PlatformMotion(Value):
         )
 
     def whole(self, X: Array) -> PoseTask:
-        """The goal of the whole platform pose X (4, 4), as far as the platform's pose counts."""
+        """Return the task of the whole platform pose X (4, 4), as far as the platform's pose counts."""
         return replace(self.at_home(), values=self.position(X), rotation=X[:3, :3] if self.body else None)
 
     def manner(self) -> PoseTask:
-        """What the platform never changes: where its point does not move, turns that it does not make (or makes about
-        one axis only)."""
+        """Return the task of what the platform never changes: the position if its point does not move, rotations that
+        it does not make (or makes about one axis only)."""
         k = self.translations.shape[1]
         fixed = np.linalg.svd(self.translations.T)[2][k:] if k else np.eye(3)
         R = self.home[:3, :3]

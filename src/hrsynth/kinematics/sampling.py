@@ -1,9 +1,9 @@
-"""Random closed configurations on the component of the zero configuration (docs/pages/theory.md, section 5).
+"""Random closed configurations on the branch of the zero configuration (docs/pages/theory.md, section 5).
 
-Each sample is reached from the zero configuration by steps that follow the branch (:mod:`.branch`), halved until they
-do, away from singularities of the loops; and the robot, led again along the poses and directions of the way, arrives.
-What fails is discarded and counted. Random vectors are drawn in coordinates and projected, so that no step depends on
-which basis of a space rounding gives. All samples must agree in what tells operation modes apart (:mod:`.branch`).
+Each sample is reached from the zero configuration by steps that follow the branch (:mod:`.branch_tests`), halved until
+they do, away from singularities of the loops; and the robot, led again along the poses and directions of the path,
+arrives. Failures are discarded and counted. Random vectors are projected from coordinates, so that no step depends on
+which basis of a space rounding gives. All samples must have one signature of the operation mode (:mod:`.branch_tests`).
 """
 
 from __future__ import annotations
@@ -53,12 +53,12 @@ from .walking import HALVED, STEP, WEAKEST, any_velocity, lands_beside, step_alo
 X = TypeVar("X")
 
 TURNS = 3
-"""Directions that a walk tries before a singularity before it is given up."""
+"""Number of directions that a walk tries before a singularity before it is given up."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Sample(Value):
-    """A closed configuration, the targets of all configurations passed on the way to it (the last one its own), and ρ
+    """Closed configuration, the targets of all configurations passed on the path to it (the last one its own), and ρ
     there."""
 
     configuration: ClosedConfiguration
@@ -67,16 +67,16 @@ class Sample(Value):
 
     @cached_property
     def shown(self) -> list[int]:
-        """How many independent numbers each observation shows clearly: fewer where it is itself nearly singular, as a
-        circle that is seen edge-on."""
+        """Number of independent values that each observation clearly shows: fewer if it is itself nearly
+        singular, as a circle that is observed edge-on."""
         rows = [self.relation.basis[self.relation.rows_of(place)] for place in range(len(self.relation.sizes))]
         return [int(np.sum(np.linalg.svd(each, compute_uv=False) > SURELY_SOMETHING)) for each in rows]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Samples(Value):
-    """Samples of one mechanism for one question; ``discarded`` draws did not stay on the branch or came too near to a
-    singularity. ``met`` are other operation modes that steps too long would have led to."""
+    """Samples of one mechanism for one observation model; ``discarded`` samples did not stay on the branch or came too
+    near to a singularity. ``met`` are other operation modes that steps too long would have led to."""
 
     observation_model: ObservationModel
     model: PinocchioModel
@@ -85,16 +85,16 @@ class Samples(Value):
     discarded: int
     other_modes: tuple[OperationMode, ...] = ()
     led: bool = True
-    """Whether the robot finds all samples again, led along their ways: not where its zero configuration is special."""
+    """True if the robot finds all samples again, led along their paths: not if its zero configuration is special."""
 
     @property
     def mobility(self) -> int:
-        """The generic mobility, idle motions included."""
+        """Generic mobility, internal motions included."""
         return self.members[0].relation.mobility
 
     @cached_property
     def signature(self) -> Signature:
-        """What tells the samples' operation mode from others, at one with the most turns."""
+        """Signature of the samples' operation mode, from one with the most rotations."""
         return Signature.of(max((member.relation for member in self.members), key=turns_of))
 
 
@@ -106,19 +106,17 @@ def sample(
     *,
     led_by: Sequence[Observation] | None = None,
 ) -> Samples:
-    """``count`` random samples of one operation mode; raises ``NotSampled`` where too few can be reached,
-    ``BranchPoint`` where the zero configuration belongs to several.
+    """Return ``count`` random samples of one operation mode; raises ``NotSampled`` if too few can be reached,
+    ``BranchPoint`` if the zero configuration belongs to several.
 
-    The robot should find its way again led by the platform's pose and the observations ``led_by`` (default: all); where
-    it does not, the samples say so. Idle motions are left out of the walks where that shows what is generic.
+    The robot should find its path again led by the platform's pose and the observations ``led_by`` (default: all); if
+    it does not, the samples record that. Internal motions are left out of the walks if that shows what is generic.
     """
     leading = {o.key for o in (observation_model.observations if led_by is None else led_by)}
     start = ClosedConfiguration.of(model, model.q0)
     moves = relation(start, observation_model).dimension > 0
     if not moves and not start.kernel()[0].shape[1]:
-        raise BadMechanism(
-            f"{model.mechanism.name}: its loops let no link move", None, "a mechanism with at least one freedom"
-        )
+        raise BadMechanism(f"{model.mechanism.name}: its loops let no link move", remedy="Check its loop closures.")
     rng = np.random.default_rng(seed)
     regular = is_regular(start, rng)
     roots = [start] if regular and moves else ways_out(start, observation_model, rng, singular=not regular)
@@ -152,8 +150,8 @@ def sample(
 
 @dataclass(eq=False)
 class _Walker:
-    """A random walk: where it is, where in (t, u̇) it last went, the configurations that it passed in its last step, the
-    targets of all that it passed, the random vectors that it takes first, and how weak the loops may become."""
+    """Random walk: its configuration, its last direction in (t, u̇), the configurations of its last step, the targets
+    of all that it passed, the random vectors that it takes first, and the least singular value allowed."""
 
     here: ClosedConfiguration
     noise: Iterator[Array]
@@ -165,8 +163,8 @@ class _Walker:
 
 @dataclass(frozen=True, eq=False)
 class _Stride:
-    """A step on its way: where it has come to, the joint velocity there and its (t, u̇), which part of it is done and
-    which comes next, and what it passed."""
+    """Step in progress: the configuration reached, the joint velocity there and its (t, u̇), the part of it that is
+    done and the next part, and the configurations passed."""
 
     here: ClosedConfiguration
     velocity: Array
@@ -176,28 +174,28 @@ class _Stride:
     passed: tuple[ClosedConfiguration, ...] = ()
 
     def tangent(self) -> Array:
-        """The next part of it, (nv,)."""
+        """Next part of it, (nv,)."""
         return self.part * shorten_step(STEP * self.velocity, 3 * STEP)
 
     def shortened(self) -> _Stride | None:
-        """With its next part halved, which did not follow the branch; None where it would be too small."""
+        """Return the step with its next part halved, which did not follow the branch; None if it would be too small."""
         return replace(self, part=self.part / 2) if self.part / 2 >= HALVED[-1] else None
 
     def ahead(self) -> _Stride | None:
-        """With a next part that may follow the branch, which is told before it is closed."""
+        """Return the step with a next part that may follow the branch, which is tested before it is closed."""
         if alike_along(self.here, self.tangent()):
             return self
         shorter = self.shortened()
         return shorter and shorter.ahead()
 
     def on(self, basis: Array) -> Array:
-        """Its direction in a basis of (t, u̇)."""
+        """Return its direction in a basis of (t, u̇)."""
         return np.asarray(basis.T @ self.direction)
 
 
 class _Walks:
-    """Random walks of one seed, in idle motions too where they go ``freely``; ``beyond`` collects closed configurations
-    that too long steps came to."""
+    """Random walks of one seed, in internal motions too if they go ``freely``; ``beyond`` collects closed
+    configurations that too long steps came to."""
 
     def __init__(
         self, observation_model: ObservationModel, leading: set[tuple[str, ...]], rng: np.random.Generator, freely: bool
@@ -206,7 +204,7 @@ class _Walks:
         self.beyond: list[ClosedConfiguration] = []
 
     def sample(self, roots: Sequence[ClosedConfiguration], count: int) -> tuple[list[Sample], int, bool]:
-        """So many samples, how many were discarded, and whether the robot finds all of them again; raises
+        """Return so many samples, the number discarded, and whether the robot finds all of them again; raises
         ``NotSampled``."""
         members, lonely = list[Sample](), list[Sample]()
         discarded, draws, most = 0, 0, 4 * count
@@ -223,14 +221,14 @@ class _Walks:
         return [*members, *lonely][:count], discarded, False
 
     def _finds_again(self, samples: Sequence[Sample]) -> Iterator[bool]:
-        """Whether the robot, led along the way of each sample, arrives."""
+        """Yield True if the robot, led along the path of each sample, arrives."""
         ways = [[target.of(lambda o: o.key in self.leading) for target in sample.way] for sample in samples]
         for led in track_paths(samples[0].configuration.model, ways, EASY_ITERATIONS) if ways else ():
             yield not isinstance(led, UndefinedValue) and led[1] <= FOLLOWED
 
     def walk(self, starts: Sequence[ClosedConfiguration]) -> list[Sample]:
-        """The samples at the ends of random walks from these configurations, in step; without those that are blocked,
-        or whose ranks are not clear."""
+        """Return the samples at the ends of random walks from these configurations, in step; without those that are
+        blocked, or whose ranks are not clear."""
         observation_model = self.question
         noise = self.rng.normal(size=(len(starts), STEPS + 1, observation_model.size))
         walkers = [
@@ -266,7 +264,7 @@ class _Walks:
         ]
 
     def _step(self, walkers: Sequence[_Walker]) -> list[_Walker]:
-        """One step of each, where it is blocked in another direction; those that were not blocked in all."""
+        """Make one step of each, in another direction if it is blocked; return those that were not blocked in all."""
         left = list(walkers)
         for _ in range(TURNS):
             if not left:
@@ -288,7 +286,7 @@ class _Walks:
         return [walker for walker in walkers if walker not in left]
 
     def _aim(self, walker: _Walker, basis: Array) -> Array:
-        """Where to go next, in this basis of (t, u̇): near where the walk last went, or anywhere."""
+        """Return the next direction, in this basis of (t, u̇): near the last one, or anywhere."""
 
         def noise() -> Array:
             drawn = next(walker.noise, None)
@@ -300,8 +298,8 @@ class _Walks:
     def _velocities(
         self, here: Sequence[ClosedConfiguration], aims: Sequence[Callable[[Array], Array]]
     ) -> list[tuple[Array, Array] | None]:
-        """A joint velocity without idle motion at each configuration, whose (t, u̇) is a unit vector, and this vector:
-        along what its aim makes of a basis; None where nothing moves so."""
+        """Return a joint velocity without internal motion at each configuration, whose (t, u̇) is a unit vector, and
+        this vector: along the projection of its aim on a basis; None if nothing moves so."""
         rows = _measure_all(self.question.rows_together, here)
         images = {i: moved @ here[i].kernel()[0] for i, moved in enumerate(rows) if moved is not None}
         found: list[tuple[Array, Array] | None] = [None] * len(here)
@@ -316,7 +314,7 @@ class _Walks:
     def _stride(
         self, going: dict[int, _Stride], weakest: Sequence[float]
     ) -> dict[int, tuple[tuple[ClosedConfiguration, ...], Array]]:
-        """The configurations to which steps along (t, u̇) lead, in parts that follow the branch, and their last
+        """Return the configurations to which steps along (t, u̇) lead, in parts that follow the branch, and their last
         directions; without those that come too near to a singularity of the loops."""
         ended: dict[int, tuple[tuple[ClosedConfiguration, ...], Array]] = {}
         while going:
@@ -343,7 +341,7 @@ class _Walks:
         return ended
 
     def _parts(self, strides: Sequence[_Stride]) -> list[ClosedConfiguration | None]:
-        """As :func:`.walking.step_along`, of the next part of several steps."""
+        """Make the next part of several steps, see :func:`.walking.step_along`."""
         model, tangents = strides[0].here.model, [stride.tangent() for stride in strides]
         predicted = [model.integrate(stride.here.q, tangent) for stride, tangent in zip(strides, tangents, strict=True)]
         solved = solve_together(TaskBatch(model, None), predicted, [None] * len(strides), tolerance=SOLVED)
@@ -360,7 +358,7 @@ class _Walks:
 def _measure_all(
     ask: Callable[[list[ClosedConfiguration]], Iterable[X]], places: Sequence[ClosedConfiguration]
 ) -> list[X | None]:
-    """What is asked of several configurations together; None at those where it cannot be measured."""
+    """Measure several configurations together; None at those at which a value is undefined."""
     try:
         return list(ask(list(places))) if places else []
     except UndefinedValue:

@@ -1,6 +1,6 @@
-"""Tasks: what a configuration is to reach besides closed loops, each an error with its Jacobian; one solver for all.
+"""Tasks: goals of a configuration besides closed loops, each an error with its Jacobian; one solver for all.
 
-Lengths are in characteristic lengths, so that errors of positions and of turns mix.
+Lengths are in characteristic lengths, so that errors of positions and of rotations mix.
 """
 
 from __future__ import annotations
@@ -27,22 +27,22 @@ DAMPING = Damping(start=1.0, eased=0.1, least=0.1, most=1e8)
 
 
 class Task(Protocol):
-    """What a configuration is to reach besides closed loops."""
+    """Goal of a configuration besides closed loops."""
 
     def error_and_jacobian(self, model: PinocchioModel, q: Array) -> tuple[Array, Array]:
-        """Error (reached − wanted) and its Jacobian."""
+        """Return the error (reached − desired) and its Jacobian."""
 
 
 class GuidedTask(Task, Protocol):
-    """A task to which a platform can be led along a way."""
+    """Task to which a platform can be led along a path."""
 
     def towards(self, X: Array, fraction: float) -> GuidedTask:
-        """What lies ``fraction`` of the way from the pose X (4, 4) to it."""
+        """Return the task at ``fraction`` of the path from the pose X (4, 4) to it."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FixedValuesTask(Value):
-    """Measured values that are to stay as they are, seen from ``reference`` where an observation names no link."""
+    """Fixed measured values, from ``reference`` if an observation names no link."""
 
     reference: str
     measured: tuple[tuple[Observation, Array], ...]
@@ -51,12 +51,12 @@ class FixedValuesTask(Value):
     def at(
         cls, model: PinocchioModel, q: Array, reference: str, observations: Sequence[Observation]
     ) -> FixedValuesTask:
-        """As they are at a configuration."""
+        """Return the task with the values at a configuration."""
         values = measure(model, q, reference, observations)[2] if observations else []
         return cls(reference, tuple(zip(observations, values, strict=True)))
 
     def error_and_jacobian(self, model: PinocchioModel, q: Array) -> tuple[Array, Array]:
-        """Error (reached − wanted) and its Jacobian."""
+        """Return the error (reached − desired) and its Jacobian."""
         if not self.measured:
             return np.zeros(0), np.zeros((0, model.nv))
         _, _, values, rates = measure(model, q, self.reference, [o for o, _ in self.measured])
@@ -66,8 +66,8 @@ class FixedValuesTask(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PoseAndValuesTask(Value):
-    """What a configuration is to reach besides closed loops: the pose X_BP of ``link`` (only the position of ``point``,
-    given in the link's frame, where there is one), and measured values."""
+    """Goal of a configuration besides closed loops: the pose X_BP of ``link`` (only the position of ``point``, given in
+    the link's frame, if there is one), and measured values."""
 
     link: str
     pose: Array
@@ -76,7 +76,7 @@ class PoseAndValuesTask(Value):
     measured: tuple[tuple[Observation, Array], ...]
 
     def error_and_jacobian(self, model: PinocchioModel, q: Array) -> tuple[Array, Array]:
-        """Error (reached − wanted) and its Jacobian."""
+        """Return the error (reached − desired) and its Jacobian."""
         observations = tuple(o for o, _ in self.measured)
         frames, velocities, values, rates = measure(model, q, self.reference, observations, (self.link,))
         X, V = frames[0], velocities[0]
@@ -86,11 +86,12 @@ class PoseAndValuesTask(Value):
         return np.concatenate([missed, *apart]), np.concatenate([block, *rates])
 
     def of(self, chosen: Callable[[Observation], bool]) -> PoseAndValuesTask:
-        """The same pose, with some of the measured values."""
+        """Return the same pose, with some of the measured values."""
         return replace(self, measured=tuple(pair for pair in self.measured if chosen(pair[0])))
 
     def between(self, other: PoseAndValuesTask, fraction: float) -> PoseAndValuesTask:
-        """What lies ``fraction`` of the way from this target to another of the same kind, all values in proportion."""
+        """Return the target at ``fraction`` of the path from this one to another of the same kind, all values in
+        proportion."""
         if fraction == 1:
             return other
         pose = other.pose.copy()
@@ -107,13 +108,13 @@ class PoseAndValuesTask(Value):
 
     @cached_property
     def wanted(self) -> Array:
-        """All measured values (size,)."""
+        """Desired measured values (size,)."""
         return np.concatenate([np.zeros(0), *(value for _, value in self.measured)])
 
     @staticmethod
     def misses(targets: Sequence[PoseAndValuesTask], X: Array, length: float) -> Array:
-        """By how much poses X (n, 4, 4) miss those of targets of one kind, or their points: characteristic lengths,
-        radians (n, 6 or 3)."""
+        """Return the differences of poses X (n, 4, 4) from those of targets of one kind, or of their points:
+        characteristic lengths, radians (n, 6 or 3)."""
         wanted, point = np.array([target.pose for target in targets]), targets[0].point
         if point is not None:
             return (
@@ -129,20 +130,20 @@ class PoseAndValuesTask(Value):
 
 
 def pose_errors(X: Array, wanted: Array, length: float) -> Array:
-    """How far poses (n, 4, 4) are shifted (lengths) and turned from those that are wanted, (n, 6)."""
+    """Return the differences of poses (n, 4, 4) from the desired ones, shifts (lengths) and rotations, (n, 6)."""
     turns = X[:, :3, :3] @ wanted[:, :3, :3].swapaxes(1, 2)
     return np.concatenate([(X[:, :3, 3] - wanted[:, :3, 3]) / length, [logarithm(R) for R in turns]], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
 class LinkPoses:
-    """Poses (4, 4) wanted of several links, and what else is wanted besides."""
+    """Desired poses (4, 4) of several links, and a further task."""
 
     wanted: tuple[tuple[str, Array], ...]
     besides: Task | None = None
 
     def error_and_jacobian(self, model: PinocchioModel, q: Array) -> tuple[Array, Array]:
-        """Error (reached − wanted) and its Jacobian."""
+        """Return the error (reached − desired) and its Jacobian."""
         reached, velocities = model.frames(q, tuple(link for link, _ in self.wanted))
         missed = pose_errors(reached, np.array([X for _, X in self.wanted]), model.length).ravel()
         error, rows = (
@@ -154,9 +155,9 @@ class LinkPoses:
 def solve(
     model: PinocchioModel, q: Array, task: Task | None = None, *, tolerance: float = CLOSED, iterations: int = 30
 ) -> tuple[Array, float]:
-    """The configuration that damped Gauss-Newton reaches from ``q``, and the residual left (loops and task).
+    """Return the configuration that damped Gauss-Newton reaches from ``q``, and the residual left (loops and task).
 
-    The damping is the square of the residual: off closure a redundant or idle direction has singular values of the
+    The damping is the square of the residual: off closure a redundant or internal direction has singular values of the
     residual's own size, which must not be followed; near closure the convergence stays fast.
     """
 
@@ -217,8 +218,8 @@ def _damped_step(normal: Array, wanted: Array) -> Array:
 
 
 class TaskBatch:
-    """Errors and Jacobians of the loops and of targets of one kind, at several configurations at once; what is known
-    of the places where one target is reached serves the next one too."""
+    """Errors and Jacobians of the loops and of targets of one kind, at several configurations at once; values at a
+    reached target are reused for the next one."""
 
     def __init__(self, model: PinocchioModel, like: PoseAndValuesTask | None) -> None:
         self.twin, self.like = model, like

@@ -1,4 +1,4 @@
-"""The relation ρ between the platform's twist and the rates of what is observed.
+"""Velocity relation ρ between the platform's twist and the rates of the observations.
 
 Source: docs/pages/theory.md, section 2; as a graph, MMT eq. 7.
 """
@@ -23,11 +23,11 @@ from .tasks import PoseAndValuesTask
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ObservationModel(Value):
-    """What is asked of a mechanism: the twist t of ``platform`` and the rates of ``observations`` seen from
+    """Observation model of a mechanism: the twist t of ``platform`` and the rates of ``observations`` from
     ``reference``; ``bodies`` are further links whose twists count too. In a formation t is the twists of the platform
     and of ``others``, one below the other.
 
-    Where ``point`` is given, t is the velocity of that point alone, in the platform's frame (a point body).
+    If ``point`` is given, t is the velocity of that point alone, in the platform's frame (a point body).
     """
 
     platform: str
@@ -44,18 +44,18 @@ class ObservationModel(Value):
 
     @property
     def of_platform(self) -> ObservationModel:
-        """The platform's own twist alone, nothing observed."""
+        """Model of the platform's own twist alone, nothing observed."""
         return replace(self, observations=(), bodies=(), others=())
 
     def target(self, at: ClosedConfiguration) -> PoseAndValuesTask:
-        """The platform pose and the measured values of a configuration."""
+        """Return the platform pose and the measured values of a configuration."""
         X, _, values, _ = measure(at.model, at.q, self.reference, self.observations, (self.platform,))
         return PoseAndValuesTask(
             self.platform, X[0], self.point, self.reference, tuple(zip(self.observations, values, strict=True))
         )
 
     def targets(self, at: Sequence[ClosedConfiguration]) -> list[PoseAndValuesTask]:
-        """:meth:`target` of several configurations of one twin."""
+        """Return :meth:`target` of several configurations of one model."""
         *_, X, _, values, _ = measure_together(
             at[0].model, [each.q for each in at], self.reference, self.observations, (self.platform,)
         )
@@ -72,8 +72,8 @@ class ObservationModel(Value):
         ]
 
     def rows(self, at: ClosedConfiguration, *, blind: frozenset[str] = frozenset()) -> Array:
-        """The map from joint rates to (t, measured rates, twists of ``bodies``), shape (rows, nv); links in ``blind``
-        are not in the mechanism, their rates are zero."""
+        """Return the map from joint rates to (t, measured rates, twists of ``bodies``), shape (rows, nv); links in
+        ``blind`` are not in the mechanism, their rates are zero."""
         seen = tuple(o for o in self.observations if o.link not in blind)
         X, V, _, rates = measure(at.model, at.q, self.reference, seen, (self.platform, *self.others, *self.bodies))
         found, own = iter(rates), 1 + len(self.others)
@@ -84,7 +84,7 @@ class ObservationModel(Value):
         return np.vstack([*parts, *V[own:]])
 
     def rows_together(self, at: Sequence[ClosedConfiguration], blind: frozenset[str] = frozenset()) -> list[Array]:
-        """:meth:`error_and_jacobian` at several configurations of one twin."""
+        """Return :meth:`error_and_jacobian` at several configurations of one model."""
         if len(at) < 2:
             return [self.rows(each, blind=blind) for each in at]
         model, links = at[0].model, (self.platform, *self.others, *self.bodies)
@@ -114,7 +114,7 @@ class ObservationModel(Value):
 
     @property
     def size(self) -> int:
-        """Rows of all that is asked."""
+        """Number of rows of ρ."""
         return self.twist_rows + sum(self.sizes) + 6 * len(self.bodies)
 
 
@@ -171,12 +171,12 @@ class VelocityRelation(Value):
 
     @property
     def seen(self) -> Rank:
-        """The rank of the measured rates on ρ: what decides which twists are lost."""
+        """Rank of the measured rates on ρ: it decides which twists are unobserved."""
         return self._unseen[2]
 
     @property
     def unobserved_twists(self) -> Array:
-        """A basis of {t : (t, 0) ∈ ρ}, the twists that no observation sees, shape (twist rows, RO)."""
+        """Basis of {t : (t, 0) ∈ ρ}, the unobserved twists, shape (twist rows, RO)."""
         return self._unseen[0]
 
     @property
@@ -192,13 +192,13 @@ class VelocityRelation(Value):
 
     @cached_property
     def rank(self) -> int:
-        """Freedoms of the platform that the observations see: dof − RO."""
+        """Platform dof that the observations show: dof − RO."""
         return self.dof.value - self.unobserved_twists.shape[1]
 
 
 def look(found: Sequence[VelocityRelation]) -> None:
-    """Take several relations apart together: what no observation sees in each, and what moves while the platform
-    rests."""
+    """Decompose several relations together: the unobserved twists of each, and what moves while the platform is
+    fixed."""
     still = spectra([each.rates for each in found], 1.0)
     unseen = range_bases([each.twist_part @ seen.kernel for each, seen in zip(found, still, strict=True)], 1.0)
     resting = spectra([each.twist_part for each in found], 1.0)
@@ -209,8 +209,8 @@ def look(found: Sequence[VelocityRelation]) -> None:
 
 
 def platform_motions(at: ClosedConfiguration, observation_model: ObservationModel) -> Array:
-    """Joint velocities (nv, dof), without idle motions, that move the platform by an orthonormal basis of its twists
-    (characteristic lengths)."""
+    """Return joint velocities (nv, dof), without internal motions, that move the platform by an orthonormal basis of
+    its twists (characteristic lengths)."""
     kernel, _ = at.kernel()
     image = observation_model.rows(at)[: observation_model.twist_rows] @ kernel
     moves, _ = range_basis(image, 1.0)
@@ -227,12 +227,12 @@ def relation(
 def relations(
     at: Sequence[ClosedConfiguration], observation_model: ObservationModel, rows: Sequence[Array]
 ) -> list[VelocityRelation]:
-    """ρ at several closed configurations of one twin, from the rows that the question has there."""
+    """Return ρ at several closed configurations of one model, from the rows that the observation model has there."""
     return _relations(at, rows, observation_model.twist_rows, observation_model.sizes)
 
 
 def relation_of(at: ClosedConfiguration, observation_model: ObservationModel, rows: Array) -> VelocityRelation:
-    """ρ between the platform's twist and what ``rows`` (measured, nv) make of the joint rates, each a measurement of
+    """Return ρ between the platform's twist and ``rows`` (measured, nv) of the joint rates, each a measured value of
     its own: the motors' coordinates, for one."""
     twist = replace(observation_model, observations=(), bodies=()).rows(at)
     return _relations([at], [np.vstack([twist, rows])], observation_model.twist_rows, (1,) * len(rows))[0]

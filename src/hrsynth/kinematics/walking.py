@@ -17,7 +17,8 @@ from .tasks import shorten_step, solve
 STEP = 0.11
 """Length of a step: the norm of (t, u̇), in characteristic lengths and radians."""
 HALVED = tuple(2.0**-k for k in range(10))
-"""Parts of a step that are tried; where the last does not follow the branch, a singularity of the loops lies ahead."""
+"""Number of parts of a step that are tried; if the last does not follow the branch, a singularity of the loops is
+ahead."""
 WEAKEST = 0.05
 """Fraction to which the loops' smallest singular value may fall below that of the zero configuration."""
 
@@ -40,13 +41,13 @@ def step_along(
 
 
 def lands_beside(here: ClosedConfiguration, step: Array, predicted: Array, there: ClosedConfiguration) -> bool:
-    """Whether ``there``, where the loops close after a step, is near its prediction and follows the branch."""
+    """Return True if ``there``, where the loops close after a step, is near its prediction and follows the branch."""
     apart = float(np.linalg.norm(here.model.difference(predicted, there.q)))
     return apart <= CORRECTED * float(np.linalg.norm(step)) + 1e-9 and follows(here, step, there)
 
 
 def any_velocity(at: ClosedConfiguration, rng: np.random.Generator) -> Array:
-    """A random joint velocity, idle motions included, a unit vector."""
+    """Return a random joint velocity, internal motions included, a unit vector."""
     velocity = random_in(at.kernel()[0], rng)
     return np.asarray(velocity / np.linalg.norm(velocity))
 
@@ -54,8 +55,8 @@ def any_velocity(at: ClosedConfiguration, rng: np.random.Generator) -> Array:
 def random_walk(
     start: ClosedConfiguration, count: int, seed: int = 0, steps: int = 40
 ) -> Iterator[ClosedConfiguration]:
-    """``count`` random configurations on the component of ``start``: walks of up to ``steps`` small steps in the
-    mechanism's own freedoms, each checked as by :func:`.sampling.sample`; one that ends early is begun again."""
+    """Yield ``count`` random configurations on the branch of ``start``: walks of up to ``steps`` small steps in all
+    motions of the mechanism, each checked as by :func:`.sampling.sample`; one that ends early is begun again."""
     rng = np.random.default_rng(seed)
     weakest = WEAKEST * start.kernel()[1].weakest
     given = failed = 0

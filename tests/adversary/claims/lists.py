@@ -11,7 +11,7 @@ from adversary.robot import Array, Items, State, things
 from adversary.search import distinct, polished, scattered, solve, split
 
 STARTS = 120
-PLACES = {"poses turned as this one": "turned", "poses whose bodies are turned as at this one": "bodies"}
+PLACES = {"poses with the rotation of this one": "turned", "poses whose links have the rotations of this one": "bodies"}
 
 
 def hidden(case: Case) -> None:

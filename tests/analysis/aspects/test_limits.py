@@ -141,7 +141,7 @@ def test_a_pose_beyond_a_limit_is_named_and_still_separated():
         opposite = answer.start.value * answer.goal.value < 0
         verdicts.append(answer.verdict)
         assert answer.verdict == (SEPARATED if opposite else UNDECIDED)
-        assert opposite or answer.reason == "at the goal on its limits or beyond: joint elbow_1"
+        assert opposite or answer.reason == "the goal is at or beyond a limit of joint elbow_1"
     assert set(verdicts) == {SEPARATED, UNDECIDED}
 
 
@@ -180,4 +180,4 @@ def test_a_pose_on_a_limit_is_not_called_beyond_it():
     goal = next(at for at in others if 0.01 < coordinates(at, "elbow_1") < 0.9)
     answer = aspects.join(aspects.setup.samples.start, goal)
     assert answer.verdict == UNDECIDED
-    assert answer.reason == "at the start on its limits or beyond: joint elbow_1"
+    assert answer.reason == "the start is at or beyond a limit of joint elbow_1"

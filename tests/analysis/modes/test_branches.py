@@ -146,7 +146,7 @@ def test_an_offset_parts_the_two_lines_of_a_u():
         assert isinstance(other, Line)
         assert gain == 1.0 < more
         assert 1e-3 * offset < np.linalg.norm(one.miss(other.centre)) < 3 * offset
-    with pytest.raises(LocusNotDerived, match="lie only"):
+    with pytest.raises(LocusNotDerived, match="differ by only"):
         reaches(offset_u(1e-8))
 
 

@@ -17,8 +17,8 @@ def test_fewer_branches_are_solved_with_less_effort_and_that_is_told():
     assert whole.found.complete
     assert not few.found.complete
     assert few.found.bound == "none"
-    assert "only 2 of 8 choices" in few.found.proof
-    assert "the effort is 0.05 s" in few.found.proof
+    assert "only 2 of 8 combinations" in few.found.proof
+    assert "the time limit is 0.05 s" in few.found.proof
     assert len(few.modes) <= len(whole.modes)
     assert few.modes[0].goal
 
@@ -27,7 +27,7 @@ def test_a_system_that_needs_more_is_not_started():
     robot = load(list_robots()["hexa"])
     confined = hrsynth.modes(robot, real=True).confined
     assert confined is not None
-    with pytest.raises(TooLarge, match=r"6 legs and 6 freedoms, needs about 0\.4 s, more than the effort of 0\.1 s"):
+    with pytest.raises(TooLarge, match=r"6 legs and 6 dof, needs about 0\.4 s, more than the effort of 0\.1 s"):
         solve_all(confined, time_limit=0.1)
 
 

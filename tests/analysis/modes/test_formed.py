@@ -110,7 +110,7 @@ def test_a_flexible_formation_has_a_continuum_with_its_flexes(places: Array, bea
     assert (found.found.continuous_family, found.found.complete, found.modes) == (flexes, False, ())
     assert found.formation is not None
     assert sum(each.count for each in found.formation.flexes) == flexes
-    assert f"a continuum of dimension {flexes}" in text(found)
+    assert f"a continuous family of dimension {flexes}" in text(found)
 
 
 KNOWN = [
@@ -216,5 +216,5 @@ def test_what_is_moved_along_is_no_other_mode(seed: int):
 def test_poses_and_motors_of_formations_are_refused():
     made = formation(np.eye(3), [(1, 2), (2, 3), (1, 3)], bodies="position")
     for asked in ({"at": "x=1"}, {"at": "mode:1"}, {"real": True}):
-        with pytest.raises(BadRequest, match="this is a formation"):
+        with pytest.raises(BadRequest, match="a formation has no"):
             modes(made, **asked)

@@ -248,7 +248,7 @@ def test_a_continuum_is_said_and_not_listed(kind: str):
         }
         modes = solve(Planar(tuple(curves[kind]), tips, X))
         assert (modes.continuous_family, modes.complete, modes.modes) == (1, False, ())
-        assert "continuum of dimension 1" in str(modes.singular_solutions)
+        assert "continuous family of dimension 1" in str(modes.singular_solutions)
 
 
 def test_other_continua():

@@ -282,12 +282,12 @@ def test_bad_files_are_refused_before_any_work(
 @pytest.mark.some(1)
 @pytest.mark.parametrize(("name", "observe"), [("quattro", "1,2"), ("i4l", None)])
 def test_a_continuum_is_not_drawn(name: str, observe: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
-    with pytest.raises(BadRequest, match=r"nothing to draw: .*continuum"):
+    with pytest.raises(BadRequest, match=r"nothing to draw: .*continuous family"):
         drawable(found(name, observe))
     arguments = [] if observe is None else ["--observe", observe]
     assert execute(["modes", name, *arguments, "-o", str(tmp_path / "x.png")]) == 0
     out, err = capsys.readouterr()
-    assert "a continuum of dimension" in out
+    assert "a continuous family of dimension" in out
     assert "is not drawn" in err
     assert list(tmp_path.iterdir()) == []
 

@@ -207,7 +207,7 @@ def test_what_is_too_large_says_its_size():
     found = hrsynth.modes("3rrr_m1")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "LARGEST_LOOPS", 5)
-        with pytest.raises(SystemNotSolved, match="2 loops, 4 angles and 0 slides: up to 6 closings, too many"):
+        with pytest.raises(SystemNotSolved, match="2 loops, 4 angles and 0 slides: up to 6 solutions, too many"):
             solve_loops(measured(found), found.goal)
 
 

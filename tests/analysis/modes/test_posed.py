@@ -237,7 +237,7 @@ def test_legs_that_are_not_watched_are_not_forgotten():
     assert found.found.continuous_family is None
     assert found.found.complete
     assert (found.found.complex, len(found.modes)) == (2, 2)
-    assert found.within == "poses turned as this one"
+    assert found.within == "poses with the rotation of this one"
 
 
 @pytest.mark.some(1)

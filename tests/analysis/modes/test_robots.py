@@ -361,7 +361,7 @@ def test_couplings_in_space_rule_poses_out(name: str, one: str, other: str, rati
     )
     found, free = modes(coupled, real=real), modes(robot, real=real)
     assert found.found.complex == free.found.complex
-    assert found.found.proof == f"without couplings, which can only rule poses out: {free.found.proof}"
+    assert found.found.proof == f"without couplings, which only exclude poses: {free.found.proof}"
     if name != "delta":  # its parallelograms cross at most closings
         check_completeness(found, FEW, seed=1)
     assert next(mode for mode in found.modes if mode.goal).reachable

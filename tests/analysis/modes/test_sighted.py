@@ -197,7 +197,7 @@ def test_what_random_starts_of_the_whole_robot_find_is_listed(name: str) -> None
     assert found.found.complete
     bodies = leg_ends(setup.decomposition)
     met = [mode.bodies[bodies[0]] for mode in search(found.goal, setup.samples.observation_model, bodies).modes]
-    if found.within == "poses turned as this one":  # others are not looked for, and a search meets them
+    if found.within == "poses with the rotation of this one":  # others are not looked for, and a search meets them
         met = [X for X in met if np.abs(X[:3, :3] - found.goal.pose(bodies[0])[:3, :3]).max() < SAME]
     listed = [mode.bodies[bodies[0]] for mode in found.modes if mode.bodies is not None]
     assert distance(met, listed, found.goal.model.length) < SAME

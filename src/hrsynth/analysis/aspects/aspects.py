@@ -1,8 +1,8 @@
-"""The atlas of the modes with the directions at one pose: which two lie in one aspect (docs/pages/proofs.md 9).
+"""Aspects of the modes with the same directions: which two lie in one aspect (docs/pages/proofs.md 9).
 
-To lie in one aspect is an equivalence: a path from one mode to another and one from there to a third join the first and
-the third, and what separates two modes separates all that are joined to them. So few pairs are asked for, those first
-whose legs are in the same working modes.
+To lie in one aspect is an equivalence: a path from one mode to a second and one from there to a third join the first
+and the third, and what separates two modes separates all that are joined to them. So few pairs are computed, first
+those whose legs are in the same working modes.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ModePair(Value, all_recorded=True):
-    """What is known of two modes, by their numbers: ``answer`` is that of ``path`` (None where nothing was asked),
-    ``via`` the modes over which the verdict follows from those of other pairs."""
+    """Verdict on two modes, by their numbers: ``answer`` is that of ``path`` (None where it was not needed), ``via``
+    the modes over which the verdict follows from those of other pairs."""
 
     numbers: Annotated[tuple[int, int], As("modes")]
     verdict: str
@@ -49,7 +49,7 @@ class ModePair(Value, all_recorded=True):
 
 
 class AspectsRecord(NamedTuple):
-    """The least and largest possible number of aspects of the modes, and which modes share one."""
+    """Least and largest possible number of aspects of the modes, and which modes share one."""
 
     least: int
     most: int
@@ -58,8 +58,19 @@ class AspectsRecord(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AspectTable(Result, shown_as="aspects"):
-    """All modes with the directions at one pose, and for each two of them what :class:`ModePair` says; ``places`` are
-    the real robot's configurations at them (None if it was not found assembled)."""
+    """Aspects of all modes with the directions at one pose.
+
+    Parameters
+    ----------
+    aspects
+        Path planner of the robot.
+    listed
+        Modes with the directions at the pose.
+    places
+        Configuration of the real robot at each mode (None if it was not found assembled).
+    pairs
+        Verdict on each two modes.
+    """
 
     aspects: PathPlanner
     listed: Annotated[AssemblyModes, FLAT]
@@ -67,11 +78,11 @@ class AspectTable(Result, shown_as="aspects"):
     pairs: Recorded[tuple[ModePair, ...]]
 
     def headline(self) -> str:
-        """The robot, how many modes, in how many aspects."""
+        """Return the robot, the number of modes and of aspects."""
         return f"{self.listed.headline()}, aspects: {self.aspects_met}"
 
     def verdict(self, one: int, other: int) -> str:
-        """The verdict on two modes by their numbers; each mode is in one aspect with itself."""
+        """Return the verdict on two modes by their numbers; each mode is in one aspect with itself."""
         return SAME if one == other else self._by_numbers[min(one, other), max(one, other)].verdict
 
     @cached_property
@@ -81,13 +92,13 @@ class AspectTable(Result, shown_as="aspects"):
     @cached_property
     @recorded()
     def table(self) -> list[list[str]]:
-        """The verdicts, mode by mode."""
+        """Verdicts, mode by mode."""
         numbers = range(1, len(self.places) + 1)
         return [[self.verdict(i, j) for j in numbers] for i in numbers]
 
     @cached_property
     def groups(self) -> tuple[tuple[int, ...], ...]:
-        """The modes at which the robot is assembled, grouped by aspect."""
+        """Modes at which the robot is assembled, grouped by aspect."""
         found: list[tuple[int, ...]] = []
         for number in (k for k, at in enumerate(self.places, 1) if at is not None):
             if not any(number in group for group in found):
@@ -100,7 +111,7 @@ class AspectTable(Result, shown_as="aspects"):
 
     @cached_property
     def count(self) -> tuple[int, int]:
-        """How many aspects there are among them, at least and at most."""
+        """Least and largest possible number of aspects among them."""
         import networkx as nx
 
         apart: nx.Graph = nx.Graph()
@@ -112,14 +123,14 @@ class AspectTable(Result, shown_as="aspects"):
 
     @property
     def aspects_met(self) -> str:
-        """How many, in words."""
+        """Number of aspects, as text."""
         few, many = self.count
         return str(few) if few == many else f"{few} to {many}"
 
     @cached_property
     def section(self) -> tuple[SingularitySlice, dict[int, CrankPlace]] | str:
-        """The surface of poses with the direction of the first watched leg held, and where the modes lie on it, by
-        number; or why there is none."""
+        """Slice of poses with the direction of the first observed leg fixed, and the modes on it, by number; or the
+        reason why there is none."""
         modes_at = {k: at for k, at in enumerate(self.places, 1) if at is not None}
         found = three_cranks(self.aspects, list(modes_at.values())) if modes_at else "there is no mode"
         if isinstance(found, str):
@@ -130,7 +141,7 @@ class AspectTable(Result, shown_as="aspects"):
 
     @property
     def changes(self) -> tuple[ModePair, ...]:
-        """The pairs that show the hidden robot to be cuspidal: two modes, each proved to lie within the tube for which
+        """Pairs that show that the hidden robot is cuspidal: two modes, each proved to lie within the tube for which
         the path between them is certified."""
         known = [mode.radius < FOLLOWED and (mode.proved or mode.goal) for mode in self.listed.modes]
         return tuple(
@@ -142,7 +153,7 @@ class AspectTable(Result, shown_as="aspects"):
     @property
     @recorded()
     def cuspidal(self) -> bool | None:
-        """Whether two modes lie in one aspect; None if that is not shown at this pose: it may be so at others."""
+        """True if two modes lie in one aspect; None if that is not shown at this pose: it may be so at others."""
         return True if self.changes else None
 
     aspects_shared = Shown(
@@ -166,23 +177,45 @@ def aspects(
     at: Annotated[
         PoseLike | ClosedConfiguration | None,
         option(
-            "Pose whose directions are held, such as x=0.02,y=0.1,z=-0.7 (default: the zero configuration).", "POSE"
+            "Pose whose directions are fixed, such as x=0.02,y=0.1,z=-0.7 (default: the zero configuration).", "POSE"
         ),
     ] = None,
     seed: Seed = 0,
     budget: int = BUDGET,
 ) -> AspectTable:
-    """Which modes with the same directions can be reached from each other without a Type 2 singularity, mode by mode.
+    """Group assembly modes by aspect: which of them are joined by a path without Type 2 singularity.
 
-    Which two of all modes with the directions at ``at`` (as for ``modes``) lie in one aspect (as for ``path``), and
-    whether that shows the hidden robot to be cuspidal: that it can go from one mode to another, with the same
-    directions, without a Type 2 singularity.
+    Parameters
+    ----------
+    robot, observe, camera, sensor
+        Robot and observations, as for ``derive``.
+    at
+        Pose whose directions are fixed (metres, radians, base frame; default: the zero configuration).
+    seed
+        Seed of the random samples and of the road maps.
+    budget
+        Largest number of intervals for one path; ``budgets.ATLAS_INTERVALS`` for all of them.
 
-    At most ``budget`` intervals are tried for a path, ``budgets.ATLAS_INTERVALS`` for all of them. Modes at which the
-    real robot was not found assembled are undecided. Raises what ``modes`` raises.
+    Returns
+    -------
+    AspectTable
+        Modes, as of ``modes``, a verdict on each two of them, as of ``path``, and whether they show that the hidden
+        robot is cuspidal. Modes at which the real robot was not found assembled are undecided.
 
-    >>> hrsynth.aspects("rrrrr_m1")
-    <Atlas: rrrrr_m1, watching 1, 2: 2 real of 2 complex (hidden robot) at x=0.02,y=0.24,z=0,phi=0deg, aspects: 2>
+    Raises
+    ------
+    BadRequest, PoseNotReached, GeometryAmbiguous
+        As for ``modes``.
+
+    Notes
+    -----
+    A robot is *cuspidal* if a path without Type 2 singularity joins two of its assembly modes (Wenger & Chablat;
+    proofs.md 9).
+
+    Examples
+    --------
+    >>> hrsynth.aspects("rrrrr_m1").aspects_met
+    '2'
     """
     listed = modes(robot, observe, camera, sensor=sensor, at=at, seed=seed)
     aspects = PathPlanner.of(listed.setup, seed=seed)
@@ -214,7 +247,7 @@ def _place(listed: AssemblyModes, number: int) -> ClosedConfiguration | None:
 
 
 def _sort_pairs(aspects: PathPlanner, places: Sequence[ClosedConfiguration | None]) -> list[tuple[int, int]]:
-    """The pairs of assembled modes, those first that differ in the fewest working modes of legs."""
+    """Sort the pairs of assembled modes: first those that differ in the fewest working modes of legs."""
     working: dict[int, tuple[float, ...]] = {}
     for number, at in enumerate(places, 1):
         if at is not None:
@@ -229,8 +262,8 @@ def _sort_pairs(aspects: PathPlanner, places: Sequence[ClosedConfiguration | Non
 
 
 def _chain(answers: dict[tuple[int, int], PathAnswer], one: int, other: int) -> tuple[str, list[int]] | None:
-    """What the answers say of two modes, and the modes over which: a way of pairs in one aspect, at most one of which
-    is separated instead (None where they say nothing)."""
+    """Return what known verdicts imply for two modes, and the modes over which: a chain of pairs in one aspect, at most
+    one of which is separated instead (None if they imply nothing)."""
     import networkx as nx
 
     joined: nx.Graph = nx.Graph([pair for pair, answer in answers.items() if answer.verdict == SAME])
@@ -251,7 +284,7 @@ def _pair(
     answers: dict[tuple[int, int], PathAnswer],
     numbers: tuple[int, int],
 ) -> ModePair:
-    """What is known of two modes."""
+    """Return the verdict on two modes."""
     answer = answers.get(numbers)
     if answer is not None and answer.verdict != UNDECIDED:
         return ModePair(numbers, answer.verdict, answer.certified, answer.reason, (), answer)
@@ -260,12 +293,12 @@ def _pair(
         verdict, way = found
         certified = all(answers[min(step), max(step)].certified for step in pairwise(way))
         said = " and ".join(f"{a}, {b}" for a, b in pairwise(way))
-        return ModePair(numbers, verdict, certified, f"it follows from modes {said}", tuple(way[1:-1]))
+        return ModePair(numbers, verdict, certified, f"follows from modes {said}", tuple(way[1:-1]))
     if answer is not None:
         return ModePair(numbers, UNDECIDED, False, answer.reason, (), answer)
     missing = [str(k) for k in numbers if places[k - 1] is None]
     if not missing:
-        return ModePair(numbers, UNDECIDED, False, "the number of intervals for all paths is used up")
+        return ModePair(numbers, UNDECIDED, False, "limit of intervals for all paths reached")
     of_modes = {listed.modes[int(k) - 1].assembly for k in missing}
     return ModePair(
         numbers,

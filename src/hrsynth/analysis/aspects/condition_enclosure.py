@@ -1,4 +1,4 @@
-"""Proofs along a way: in every interval of it all legs reach, and the condition's value is enclosed away from zero."""
+"""Proofs along a path: in every interval of it all legs reach, and the condition's value is enclosed away from zero."""
 
 from __future__ import annotations
 
@@ -24,31 +24,32 @@ Leading = tuple[int, Field] | None
 
 @dataclass(frozen=True, eq=False)
 class ConditionEnclosure:
-    """The value of the condition at poses: of a signed condition its expression, else the smallest singular value of
-    its rows (of balls, a lower bound of it)."""
+    """Value of the condition at poses: of a signed condition its expression, else the smallest singular value of its
+    rows (of balls, a lower bound of it)."""
 
     condition: Named
     forms: LegForms
 
     @property
     def signed(self) -> bool:
-        """Whether the value has a sign."""
+        """True if the value has a sign."""
         return sign_of(self.condition)
 
     @property
     def unlimited(self) -> ConditionEnclosure:
-        """The same without joint limits."""
+        """Enclosure without joint limits."""
         return replace(self, forms=replace(self.forms, bounds=()))
 
     def raw(self, p: Field, R: Field, leading: Leading = None) -> tuple[Field, Field]:
-        """Reserves (n, limbs) and the expression (n,) of a condition with a sign, for numbers, balls or jets."""
+        """Return reach margins (n, subchains) and the expression (n,) of a condition with a sign, for numbers, balls or
+        jets."""
         found = self.forms.at(p, R, leading)
         names, run = _compile(self.condition.expression)
         return found.reach_margins, run(*(found.values[name] for name in names))
 
     def at(self, p: Field, R: Field, leading: Leading = None) -> tuple[NDArray[np.bool_], Field]:
-        """Whether all legs reach, (n,), and the value, (n,), at poses (n, 3), (n, 3, 3); NaN or no number where they
-        do not; ``leading`` as for :meth:`LegForms.at`."""
+        """Return whether all legs reach, (n,), and the value, (n,), at poses (n, 3), (n, 3, 3); NaN or not a number
+        where they do not; ``leading`` as for :meth:`LegForms.at`."""
         if self.signed:
             reach_margins, value = self.raw(p, R, leading)
             return np.asarray(above_zero(reach_margins).all(axis=1)), value
@@ -69,8 +70,8 @@ class ConditionEnclosure:
         return reached, values
 
     def bounds(self, way: PathSegment, low: Array, high: Array) -> Array:
-        """Lower bounds of |value| on intervals of a way, (n,); 0 where reach or value is not proved. Where a value
-        holds zero its mean value form is tried, which is sharper on short intervals."""
+        """Return lower bounds of |value| on intervals of a segment, (n,); 0 where reach or value is not proved. Where a
+        value contains zero its mean value form is tried, which is sharper on short intervals."""
         boxes = balls(low, high)
         sure, value = self.at(*way.at(boxes))
         found = np.where(sure, below(value), 0.0)
@@ -85,7 +86,7 @@ class ConditionEnclosure:
 
 @lru_cache(maxsize=64)
 def _compile(expression: Any) -> tuple[list[str], Callable[..., Any]]:
-    """The symbols of an expression in vectors, and the function of them, for numbers, balls and jets."""
+    """Return the symbols of an expression in vectors, and the function of them, for numbers, balls and jets."""
     import sympy
 
     names = sorted(str(symbol) for symbol in expression.free_symbols)
@@ -94,7 +95,7 @@ def _compile(expression: Any) -> tuple[list[str], Callable[..., Any]]:
 
 
 def sign_of(condition: Named) -> bool:
-    """Whether a condition's expression is one in vectors and changes its sign across the locus."""
+    """Return True if a condition's expression is one in vectors and changes its sign across the locus."""
     import sympy
 
     return condition.signed and not isinstance(condition.expression, sympy.Determinant)
@@ -102,7 +103,8 @@ def sign_of(condition: Named) -> bool:
 
 @dataclass(frozen=True)
 class Proof:
-    """Whether a way is proved free, the smallest enclosed |value| on it (0 where it is not), and intervals used."""
+    """Proof that a segment is free of singularities: the smallest enclosed |value| on it (0 if not proved), and the
+    number of intervals used."""
 
     proved: bool
     margin: float
@@ -110,9 +112,9 @@ class Proof:
 
 
 def prove(enclosure: ConditionEnclosure, way: PathSegment, budget: int) -> Proof:
-    """Enclose reach and value along a way by bisection with at most ``budget`` intervals.
+    """Enclose reach and value along a segment by bisection with at most ``budget`` intervals.
 
-    Given up as soon as a midpoint is out of reach or lies on the other side, or an interval is too short.
+    Stops as soon as a midpoint is out of reach or on the other side, or an interval is too short.
     """
     ends = np.linspace(0, 1, FIRST_INTERVALS + 1)
     low, high = ends[:-1], ends[1:]
@@ -136,8 +138,8 @@ def prove(enclosure: ConditionEnclosure, way: PathSegment, budget: int) -> Proof
 
 
 def enclose_value(enclosure: ConditionEnclosure, p: Array, R: Array) -> tuple[bool, float]:
-    """Whether all poses within ``tolerances.FOLLOWED`` of one reach, and a bound of the value with its sign: the point
-    of their values that is nearest to zero (0 where zero is among them)."""
+    """Return whether all poses within ``tolerances.FOLLOWED`` of one are reached, and a bound of the value with its
+    sign: the value among them that is nearest to zero (0 if zero is among them)."""
     here = StraightSegment(p, R, np.zeros(3), np.zeros(3))
     reached, values = enclosure.at(*here.at(balls([0.0], [0.0])))
     _, middle = enclosure.at(*here.at(np.zeros(1)))
@@ -145,8 +147,9 @@ def enclose_value(enclosure: ConditionEnclosure, p: Array, R: Array) -> tuple[bo
 
 
 def is_beyond(enclosure: ConditionEnclosure, p: Array, R: Array) -> bool:
-    """Whether a joint whose limits follow from the pose and from limbs of the condition is proved to be beyond them at
-    one pose, whatever the working modes of other limbs."""
+    """Return True if a joint is proved to be beyond its limits at one pose, in any working mode of the subchains that
+    the condition does not contain. Only joints whose coordinate follows from the pose and the other subchains are
+    tested."""
     forms = enclosure.forms
     known = limbs_of(tuple(forms.vectors.values()))
     forms = replace(forms, bounds=tuple(bound for bound in forms.bounds if limbs_of(bound) <= known))
@@ -155,8 +158,8 @@ def is_beyond(enclosure: ConditionEnclosure, p: Array, R: Array) -> bool:
 
 
 def _weakest(values: dict[str, Field], condition: Named) -> float:
-    """A lower bound of the smallest singular value of rows A of balls, (d columns): with B a pseudo-inverse of their
-    midpoints, σ ≥ (1 − |I − B A|) / |B|."""
+    """Return a lower bound of the smallest singular value of rows A of balls, (d columns): with B a pseudo-inverse of
+    their midpoints, σ ≥ (1 − |I − B A|) / |B|."""
     from flint import arb_mat
 
     A = rows(condition.pattern, values)[0]
@@ -172,6 +175,6 @@ def _weakest(values: dict[str, Field], condition: Named) -> float:
 
 
 def _frobenius(matrix: Any) -> Any:
-    """An enclosure of the largest Frobenius norm of the matrices in one of balls."""
+    """Return an enclosure of the largest Frobenius norm of the matrices in one of balls."""
     entries = [x.abs_upper() for x in matrix.entries()]
     return sum((x * x for x in entries[1:]), start=entries[0] * entries[0]).sqrt()

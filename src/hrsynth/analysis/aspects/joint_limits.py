@@ -22,7 +22,7 @@ Value = Callable[[VectorExpression], Field]
 
 @dataclass(frozen=True, eq=False)
 class LinkVector:
-    """A vector fixed in a link: from one source to another, or one source alone."""
+    """Vector fixed in a link: from one source to another, or one source alone."""
 
     end: VectorExpression
     start: VectorExpression | None = None
@@ -33,8 +33,9 @@ class LinkVector:
 
 @dataclass(frozen=True, eq=False)
 class TurnLimit:
-    """An R joint's angle, from ``one`` in its predecessor to ``two`` in its successor about ``axis``, is nearer than
-    ``half`` to ``middle``. ``size`` is the product of the two vectors' parts normal to the axis."""
+    """Limit of an R joint: its angle, from ``one`` in its predecessor to ``two`` in its successor about ``axis``,
+    differs from ``middle`` by less than ``half``. ``size`` is the product of the two vectors' parts normal to the
+    axis."""
 
     joint: str
     axis: VectorExpression
@@ -53,8 +54,8 @@ class TurnLimit:
 
 @dataclass(frozen=True, eq=False)
 class SlideLimit:
-    """A P joint's shift along ``axis``, from a point of its predecessor to one of its successor (characteristic
-    lengths): |shift − middle| < half."""
+    """Limit of a P joint: its shift along ``axis``, from a point of its predecessor to one of its successor
+    (characteristic lengths): |shift − middle| < half."""
 
     joint: str
     axis: VectorExpression
@@ -72,7 +73,7 @@ JointLimit = TurnLimit | SlideLimit
 
 
 def bounds(sight: SampledMechanism, source: Callable[..., VectorExpression]) -> Iterator[JointLimit]:
-    """The limits of joints that can be told from the pose."""
+    """Yield the limits of joints whose coordinate follows from the pose."""
     for name, (lower, upper) in sight.mechanism.joint_ranges.items():
         if not -np.inf < lower < upper < np.inf:
             continue
@@ -115,7 +116,7 @@ def _bound(
 
 @dataclass(frozen=True, eq=False)
 class _Known:
-    """Points and vectors of links that the pose decides, with their values at the configurations seen."""
+    """Points and vectors of links that follow from the pose, with their values at the sampled configurations."""
 
     sight: SampledMechanism
     of: Callable[..., VectorExpression]
@@ -142,5 +143,6 @@ class _Known:
 
 
 def _turn_between(one: Field, two: Field, axis: Field) -> tuple[Field, Field]:
-    """Cosine and sine of the turn from a vector to another about a unit axis, times their parts normal to it."""
+    """Return cosine and sine of the rotation from a vector to another about a unit axis, times their parts normal to
+    it."""
     return (np.asarray(dot(one, two) - dot(one, axis) * dot(two, axis)), dot(axis, cross(one, two)))

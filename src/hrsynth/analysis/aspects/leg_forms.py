@@ -1,5 +1,6 @@
-"""The form of each leg and of each vector, found from the mechanism over configurations, never by names; what a pose
-decides with them: whether each leg reaches it in its working mode, whether joints are within their limits, and the
+"""Closed forms of legs and vectors, read from the mechanism and its configurations, never from names.
+
+A pose determines whether each leg reaches it in its working mode, whether joints are within their limits, and the
 vectors that the condition names. Lengths in characteristic lengths, base axes.
 """
 
@@ -25,8 +26,8 @@ from .vector_expressions import JointRules, NoLegForm, VectorExpression, value_o
 
 @dataclass(frozen=True, eq=False)
 class LegStates:
-    """Reach margins (n, limbs + bounds) and the condition's vectors by symbol, (n, 3), at poses; points from the
-    first leg's tip."""
+    """Reach margins (n, subchains + bounds) and the condition's vectors by symbol, (n, 3), at poses; points relative to
+    the first leg's tip."""
 
     reach_margins: Field
     values: Mapping[str, Field]
@@ -39,27 +40,28 @@ class LegForms:
     subchains: tuple[ClosedFormLeg, ...]
     vectors: Mapping[str, VectorExpression]
     points: tuple[str, ...] = ()
-    """Symbols of points; the first is where they are measured from."""
+    """Symbols of points; the first is their origin."""
     bounds: tuple[JointLimit, ...] = ()
     """Limits of joints; each has a margin too."""
 
     @property
     def modes(self) -> tuple[float, ...]:
-        """The working mode of each limb, ±1."""
+        """Working mode of each subchain, ±1."""
         return tuple(limb.mode for limb in self.subchains)
 
     def flipped(self, limb: int) -> LegForms:
-        """The same with one limb in its other working mode."""
+        """Return the forms with one subchain in its other working mode."""
         other = replace(self.subchains[limb], mode=-self.subchains[limb].mode)
         return replace(self, subchains=(*self.subchains[:limb], other, *self.subchains[limb + 1 :]))
 
     def beyond(self, p: Array, R: Array) -> tuple[str, ...]:
-        """The joints that are not within their limits at one pose (3,), (3, 3)."""
+        """Return the joints that are not within their limits at one pose (3,), (3, 3)."""
         within = self.at(p[None], R[None]).reach_margins[0, len(self.subchains) :][: len(self.bounds)] > 0
         return tuple(bound.joint for bound, held in zip(self.bounds, within, strict=True) if not held)
 
     def at(self, p: Field, R: Field, leading: tuple[int, Field] | None = None) -> LegStates:
-        """What poses (n, 3), (n, 3, 3) decide, for numbers or balls; of a limb that leads, what it carries is given."""
+        """Evaluate poses (n, 3), (n, 3, 3), as numbers or balls; for a subchain that leads, the vector that it carries
+        is given."""
         with np.errstate(invalid="ignore"):
             solved = [
                 (0 * p[:, 0] + 1.0, leading[1])
@@ -77,7 +79,7 @@ class LegForms:
 
 @dataclass(frozen=True, eq=False)
 class LegPattern:
-    """Closed forms without a working mode, the vector that each carries, and how the wanted vectors follow."""
+    """Closed forms without a working mode, the vector that each carries, and how the required vectors follow."""
 
     coordinates: PathCoordinates
     subchains: tuple[ClosedFormLeg, ...]
@@ -87,18 +89,19 @@ class LegPattern:
     bounds: tuple[JointLimit, ...] = ()
     """Limits of joints that are kept."""
     loose: tuple[str, ...] = ()
-    """Labels of legs with loops inside them of which the forms do not say that they close."""
+    """Labels of legs with inner loops that the forms do not prove to close."""
 
     @property
     def fitted(self) -> tuple[str, ...]:
-        """What was fitted to samples and not read from the joints: legs, and vectors by their symbols; and the legs
-        whose inner loops are closed at samples alone."""
+        """Parts that were fitted to samples and not read from the joints: legs, vectors by their symbols, and legs
+        whose inner loops close at samples only."""
         legs = dict.fromkeys(f"leg {limb.label}" for limb in self.subchains if limb.fitted)
         loops = (f"the loops inside leg {label}" for label in self.loose)
         return (*legs, *(symbol for symbol, source in self.vectors.items() if source.fitted), *loops)
 
     def forms(self, at: ClosedConfiguration) -> LegForms:
-        """The forms in a configuration's working mode; raises ``NoLegForm`` where a leg does not follow its form."""
+        """Return the forms in a configuration's working mode; raises ``NoLegForm`` where a leg does not follow its
+        form."""
         p, R = self.coordinates.of([at])
         limbs = []
         for limb, feature in zip(self.subchains, self.carried, strict=True):
@@ -117,7 +120,8 @@ def pattern(
     coordinates: PathCoordinates,
     configurations: Sequence[ClosedConfiguration],
 ) -> LegPattern:
-    """The forms of all legs and of the wanted features; raises ``NoLegForm`` where one fits none."""
+    """Return the forms of all legs and of the required features; raises ``NoLegForm`` if one of them has no known
+    form."""
     rules = JointRules.of(decomposition, coordinates, configurations)
     sight = SampledMechanism(decomposition.mechanism, coordinates, configurations, rules)
     found: list[tuple[ClosedFormLeg, NamedVector]] = []
@@ -126,7 +130,7 @@ def pattern(
             continue
         of_leg = list(sight.subchains(leg))
         if not of_leg:
-            raise NoLegForm(f"leg {leg.label} is neither a rod on a crank or rail nor a rod that slides")
+            raise NoLegForm(f"leg {leg.label} has no known closed form (rod on a crank or rail, or sliding rod)")
         found += of_leg
     limbs, carried = (tuple(part) for part in zip(*found, strict=True)) if found else ((), ())
     loose = tuple(leg.label for leg in decomposition.legs if not sight.closes(leg, carried))

@@ -1,4 +1,4 @@
-"""Whether two poses lie in one aspect: joined by a certified path, separated by a proof, or undecided (proofs.md 9)."""
+"""Paths between two poses: joined by a certified path, separated by a proof, or undecided (proofs.md 9)."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ from .verdicts import SAME, SEPARATED, UNDECIDED
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PathEnd(OfConfiguration, Value):
-    """A requested pose: the whole pose that is reached, the configuration in which it is, and the value of the
-    condition there; at the goal of a path the value in the working modes in which the path ends."""
+    """Requested pose: the whole pose that is reached, its configuration, and the value of the condition there; at the
+    goal the value in the working modes in which the path ends."""
 
     pose: Recorded[Pose]
     configuration: ClosedConfiguration
@@ -50,20 +50,20 @@ class PathEnd(OfConfiguration, Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SampledRoute(Value, all_recorded=True):
-    """The condition at ``count`` poses on the straight path between two poses: the smallest |value|, and ``at`` which
-    pose; how often its sign changes from one to the next (None for a value without sign); the part of the path that was
-    ``reached``, and what was first seen not to be in front of its camera. Nothing is known between the poses."""
+    """Condition at ``count`` poses on the straight path between two poses: the smallest |value|, and ``at`` which pose;
+    number of sign changes from one to the next (None for a value without sign); the part of the path that was
+    ``reached``, and the first feature that leaves the field of view. Nothing is known between the poses."""
 
     count: Annotated[int, As("poses")]
     least: float
     at: Pose
     changes: int | None
     reached: float
-    out_of_view: Annotated[str | None, As("lost_from_sight")]
+    out_of_view: str | None
 
 
 class Crossing(NamedTuple):
-    """A leg that changes its working mode, and the pose of the path at which it does."""
+    """Leg that changes its working mode, and the pose of the path at which it does."""
 
     leg: str
     at: int
@@ -71,12 +71,29 @@ class Crossing(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PathAnswer(Result, shown_as="path"):
-    """``same aspect`` (with a certified path), ``separated`` or ``undecided``, and why.
+    """Verdict on two poses: same aspect (with a certified path), separated or undecided, and the reason.
 
-    Between its poses the path moves the told ``point`` on straight lines and turns the platform about one axis;
-    where a leg passes from one working mode to the other (``crossings``), its rod and its crank or coordinates lead to
-    the leg's limit and back. ``margin`` bounds the condition's |value| along a certified path, at the ends where
-    they are separated; ``boxes`` are the intervals of all proofs tried.
+    Between its poses the path moves one point of the platform on straight lines and rotates the platform about one
+    axis. Where a leg passes from one working mode to the other (``crossings``), it goes to its limit and back.
+
+    Parameters
+    ----------
+    setup
+        Robot with its observations.
+    verdict
+        ``same aspect``, ``separated`` or ``undecided``.
+    certified
+        True if the verdict is proved by interval arithmetic.
+    poses
+        Poses of the platform along the path (metres, radians, base frame).
+    margin
+        Lower bound of the condition's |value| along a certified path, at both ends if they are separated.
+    boxes
+        Number of intervals of all proofs tried.
+    start, goal
+        Requested poses, with the value of the condition there.
+    reason
+        Reason of the verdict.
     """
 
     setup: ObservedRobot
@@ -92,45 +109,45 @@ class PathAnswer(Result, shown_as="path"):
     coordinates: PathCoordinates | None = None
     segments: tuple[PathSegment, ...] = ()
     limits: Recorded[tuple[str, ...]] = ()
-    """Joints whose limits hold all along a certified path."""
+    """Joints whose limits are met all along a certified path."""
     limits_ignored: tuple[str, ...] = ()
     """Joints whose limits are not considered."""
     any_mode: bool = False
-    """Whether the goal is a pose, whatever the working modes of its legs, and not a configuration."""
+    """True if the goal is a pose, in any working modes of its legs, and not a configuration."""
     goal_modes: tuple[tuple[float, ...], ...] = ()
-    """Working modes of all limbs at the goal in which the sign is proved to be opposite to the start's, where they are
+    """Working modes of all subchains at the goal in which the sign is proved to be opposite to the start's, if they are
     separated."""
     road: Annotated[SampledRoute | None, As("sampled")] = None
-    """The straight way, sampled; where neither a path nor a separation was enclosed."""
+    """Straight path, sampled; given if neither a path nor a separation was enclosed."""
 
     def headline(self) -> str:
-        """The robot and the verdict."""
+        """Return the robot and the verdict."""
         return f"{self.setup.headline()}: {self.verdict}"
 
     @property
     def stays(self) -> bool:
-        """Whether start and goal are one pose of the platform, to the digits printed."""
+        """True if start and goal are one pose of the platform, to the digits printed."""
         one, other = (at.pose(self.setup.motion.link) for at in (self.start.configuration, self.goal.configuration))
         return bool(np.max(np.abs(one - other)) <= AS_PRINTED)
 
     @property
     @recorded(As("not_considered"))
     def not_proved(self) -> str:
-        """What a certificate says nothing about."""
+        """Facts that a certificate does not cover."""
         joints = f"limits of joints {', '.join(self.limits_ignored)}; " if self.limits_ignored else ""
         if not all(o.by_segment for o in self.setup.observed):
-            joints += "what is behind a camera or out of its picture; "
+            joints += "points behind a camera or out of its image; "
         return f"{joints}collisions and constraint singularities of the loops are not considered"
 
     @property
     def where(self) -> str:
-        """Which paths are meant: on which what is observed has a value (no point is in a camera's centre)."""
+        """Restriction of the paths: all that is observed has a value on them (no point is in a camera's centre)."""
         return "" if all(o.by_segment for o in self.setup.observed) else "on which all that is observed has a value "
 
     @property
     @recorded()
     def crossings(self) -> tuple[Crossing, ...]:
-        """The legs that change their working mode, each with the place of its limit in ``poses``."""
+        """Legs that change their working mode, each with the index of its limit in ``poses``."""
         found, place = [], 0
         for way in self.segments:
             if isinstance(way, WorkingModeChange):
@@ -147,7 +164,8 @@ class PathAnswer(Result, shown_as="path"):
 
 
 def between(answer: PathAnswer, coordinates: PathCoordinates, ways: Sequence[PathSegment]) -> list[Pose]:
-    """The platform's poses between the ways, and that at a leg's limit in the middle of a mode_change."""
+    """Return the platform's poses between the segments, and the pose at a leg's limit in the middle of a change of
+    working mode."""
     motion = coordinates.motion
     here = answer.start.configuration
     found = []
@@ -168,7 +186,7 @@ def _marks(way: PathSegment) -> list[tuple[Array, Array]]:
 
 
 def _lead_to(here: ClosedConfiguration, coordinates: PathCoordinates, p: Array) -> ClosedConfiguration:
-    """The configuration with the coordinates's point at ``p``."""
+    """Return the configuration in which the point of the coordinates is at ``p``."""
     motion = coordinates.motion
     directions = motion.translations.T
     goal = replace(motion.at_home(), directions=directions, values=coordinates.length * directions @ p)
@@ -176,23 +194,23 @@ def _lead_to(here: ClosedConfiguration, coordinates: PathCoordinates, p: Array) 
 
 
 SAMPLES = 33
-"""Poses at which a way is sampled that cannot be enclosed."""
+"""Number of poses at which a path that cannot be enclosed is sampled."""
 BUDGET = 10_000
-"""Intervals that are enclosed in all before a path is given up."""
+"""Largest number of intervals for one path."""
 CLEAR = RANK_CUTOFF * RANK_GAP
-"""Values of a condition below this may be zero."""
+"""Smallest |value| of a condition that counts as nonzero."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PathPlanner(Value):
-    """A robot with its Type 2 condition, ready to be asked for paths between configurations."""
+    """Path planner of a robot, with its Type 2 condition."""
 
     setup: ObservedRobot
     motion: PlatformMotion
     structure: ConstraintPattern
     condition: Condition
     lost: str
-    """Freedoms that are never seen, in words; empty where there are none. With them every pose is singular."""
+    """Unobserved twists, as text; empty if there are none. With them every pose is singular."""
 
     @classmethod
     def of(
@@ -204,7 +222,7 @@ class PathPlanner(Value):
         sensor: SeeLike = None,
         seed: int = 0,
     ) -> PathPlanner:
-        """The condition of a robot from random samples of its motion."""
+        """Return the planner of a robot, its condition from random samples of its motion."""
         setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed)
         seen = MeasuredRobot.of_directions(setup)
         return cls(
@@ -213,12 +231,12 @@ class PathPlanner(Value):
 
     @property
     def members(self) -> list[ClosedConfiguration]:
-        """The zero configuration and the samples."""
+        """Zero configuration and samples."""
         return [self.setup.all_samples.start, *self.setup.configurations]
 
     @cached_property
     def pattern(self) -> LegPattern | str:
-        """The forms of legs and vectors, or why there are none."""
+        """Forms of legs and vectors, or the reason why there are none."""
         if not isinstance(self.condition, Named):
             return "the condition has no named vectors"
         used = {str(symbol) for symbol in self.condition.expression.free_symbols}
@@ -226,10 +244,10 @@ class PathPlanner(Value):
         many = self.motion.translations.shape[1] + self.motion.rotations.shape[1]
         reason = (
             f"the {many} parts of the platform's pose that change depend on each other, {self.setup.dof} are "
-            "free: ways that move a point straight and turn about one axis do not keep to the others"
+            "free: a straight path of a point with rotation about one axis does not keep the others"
         )
         if many == self.setup.dof:
-            reason = "the platform has other freedoms at the zero configuration than elsewhere"
+            reason = "the platform has another dof at the zero configuration than elsewhere"
         observation_model = self.setup.samples.observation_model
         for each in path_coordinates(self.setup.decomposition, observation_model, self.setup.dof, self.members):
             try:
@@ -239,7 +257,8 @@ class PathPlanner(Value):
         return reason
 
     def enclosure(self, at: ClosedConfiguration) -> ConditionEnclosure:
-        """The condition as a function of the pose, in the working mode of a configuration; raises ``NoLegForm``."""
+        """Return the condition as a function of the pose, in the working mode of a configuration; raises
+        ``NoLegForm``."""
         if isinstance(self.pattern, str) or not isinstance(self.condition, Named):
             raise NoLegForm(str(self.pattern))
         return ConditionEnclosure(self.condition, self.pattern.forms(at))
@@ -253,7 +272,7 @@ class PathPlanner(Value):
         budget: int = BUDGET,
         any_mode: bool = False,
     ) -> PathAnswer:
-        """Whether a path without Type 2 singularity leads from a configuration to another, where legs that are not
+        """Search for a path without Type 2 singularity from a configuration to another, where legs that are not
         observed may be in any working mode; with ``any_mode`` to the other's pose, all legs in any working mode."""
         found, scene = self.condition, self.structure.values_at([start, goal])
         values = found.evaluate(scene) if found.signed else smallest_of(found.rows(scene))
@@ -278,9 +297,9 @@ class PathPlanner(Value):
             return replace(answer, reason=f"every pose is singular, {self.lost}")
         if min(abs(end.value) for end in ends) < CLEAR:
             least = min(ends, key=lambda end: abs(end.value))
-            told = "a pose lies on the singular locus, or too near to it to be distinguished"
+            told = "a pose is singular, or too near to the singular locus to be distinguished"
             if abs(least.value) < SOLVED and weakest(least.configuration, self.setup.samples.observation_model) > CLEAR:
-                told = "the condition vanishes where no freedom is lost: it is not this robot's"
+                told = "the condition vanishes where no twist is unobserved: it is not this robot's"
             return replace(answer, reason=told)
         try:
             enclosures = [self.enclosure(end.configuration) for end in ends]
@@ -290,7 +309,7 @@ class PathPlanner(Value):
         return self._decide(answer, enclosures, seed, budget)
 
     def road(self, start: ClosedConfiguration, goal: ClosedConfiguration) -> SampledRoute:
-        """The straight way of the platform from a configuration to the pose of another, sampled."""
+        """Sample the platform's straight path from a configuration to the pose of another."""
         motion, observation_model = self.motion, self.setup.samples.observation_model
         target, X = motion.whole(goal.pose(motion.link)), start.pose(motion.link)
         way = [start]
@@ -317,7 +336,7 @@ class PathPlanner(Value):
     def _decide(
         self, answer: PathAnswer, enclosures: Sequence[ConditionEnclosure], seed: int, budget: int
     ) -> PathAnswer:
-        """The verdict where poses decide what the legs do."""
+        """Decide where the pose determines the legs."""
         assert isinstance(self.pattern, LegPattern)
         coordinates = self.pattern.coordinates
         p, R = coordinates.of([answer.start.configuration, answer.goal.configuration, *self.members])
@@ -351,8 +370,8 @@ class PathPlanner(Value):
     def _across(
         self, goal: ConditionEnclosure, place: Place, values: Sequence[float], seen: Collection[str]
     ) -> tuple[tuple[tuple[float, ...], ...], list[ConditionEnclosure], float]:
-        """Of the working modes of the goal, of legs that are not ``seen``: those in which the value's sign is proved to
-        be opposite to the start's; those in which it is not, nor a joint proved to be beyond its limits, first those
+        """Classify the working modes of the goal, of legs that are not ``seen``: those in which the value's sign is
+        proved to be opposite to the start's; all others without a joint proved to be beyond its limits, first those
         nearest to the goal's; and the smallest |value| at the start and in the former."""
         limbs, across, others, margin = goal.forms.subchains, [goal.forms.modes], [], min(map(abs, values))
         able = [k for k in sorted(limbs_of(tuple(goal.forms.vectors.values()))) if limbs[k].label not in seen]
@@ -376,7 +395,7 @@ class PathPlanner(Value):
         seed: int,
         budget: int,
     ) -> PathAnswer:
-        """A path to the goal in a working mode in which its sign is the start's; ``undecided`` if none is found."""
+        """Search for a path to the goal in a working mode with the start's sign; ``undecided`` if none is found."""
         spent, limbs = 0, self.enclosure(answer.goal.configuration).forms.subchains
         for there in others:
             legs = [
@@ -404,8 +423,8 @@ class PathPlanner(Value):
             answer,
             boxes=spent,
             reason=(
-                "the expression has opposite signs at the start and at the goal in the working modes reached, so every "
-                "path between these crosses its zeros; but not in other working modes of leg "
+                "the expression has opposite signs at the start and at the goal in the reached working modes, so every "
+                "path between these crosses its zeros; not so in other working modes of leg "
                 f"{', '.join(able)} at the goal, and no path to these was proved"
             ),
         )
@@ -418,28 +437,28 @@ class PathPlanner(Value):
         seed: int,
         budget: int,
     ) -> PathAnswer:
-        """The verdict by a path between the first two poses."""
+        """Decide by a path between the first two poses."""
         assert isinstance(self.pattern, LegPattern)
         (p, R), coordinates, fitted = poses, self.pattern.coordinates, self.pattern.fitted
         for end, enclosure, place, turn in zip(("start", "goal"), enclosures, p, R, strict=False):
             beyond = enclosure.forms.beyond(place, turn)
             if beyond:
-                return replace(answer, reason=f"at the {end} on its limits or beyond: joint {', '.join(beyond)}")
+                return replace(answer, reason=f"the {end} is at or beyond a limit of joint {', '.join(beyond)}")
         region = PoseRegion.around(coordinates, p, R)
         found = plan((enclosures[0], enclosures[1]), region, (p[0], R[0]), (p[1], R[1]), seed=seed, budget=budget)
         answer = self._add_ways(answer, found, self.pattern)
         if not found.proved:
             return replace(answer, reason=_why_undecided(found, enclosures, budget))
         if not leads(found.ways, (p[0], R[0]), (p[1], R[1]), enclosures):
-            return replace(answer, reason="no path was proved: what was found does not lead from pose to pose")
+            return replace(answer, reason="no path was proved: the path found does not join the two poses")
         if self.pattern.loose:
             ends = answer.start.configuration, answer.goal.configuration
             return replace(
                 answer,
                 road=self.road(*ends),
                 reason=(
-                    "the condition and the reach of all rods are enclosed along the path, not whether the loops inside "
-                    f"leg {', '.join(self.pattern.loose)} close on it"
+                    "the condition and the reach of all rods are enclosed along the path; not proved that the loops "
+                    f"inside leg {', '.join(self.pattern.loose)} close on it"
                 ),
             )
         forms = f", for forms that are fitted to samples: {', '.join(fitted)}" if fitted else ""
@@ -452,7 +471,7 @@ class PathPlanner(Value):
         )
 
     def _add_ways(self, answer: PathAnswer, found: PlannedPath, known: LegPattern) -> PathAnswer:
-        """The answer with a plan's ways, and the joints whose limits these keep."""
+        """Return the answer with a plan's segments, and the joints whose limits these keep."""
         kept = tuple(bound.joint for bound in known.bounds)
         answer = replace(
             answer,
@@ -487,25 +506,49 @@ def path(
     seed: Seed = 0,
     budget: int = BUDGET,
 ) -> PathAnswer:
-    """Whether a path without Type 2 singularity joins two poses, with a proof: same aspect, separated, undecided.
+    """Find a path without Type 2 singularity between two poses, with a proof: same aspect, separated or undecided.
 
-    Whether a path without Type 2 singularity of the hidden robot joins two poses (docs/pages/proofs.md, section 9).
-    Its condition is that of the real robot's relation, which is the exact lift's (theory.md 3). The path passes only
-    through poses at which everything seen has a value, in front of the camera or not.
+    Parameters
+    ----------
+    robot, observe, camera, sensor
+        Robot and observations, as for ``derive``.
+    start
+        Start pose, or joint coordinates, in the working modes in which it is reached.
+    goal
+        Goal pose, in any working modes; ``mode:2`` is an assembly mode of the start, with its observed directions.
+    seed
+        Seed of the random samples and of the road map.
+    budget
+        Largest number of intervals.
 
-    Both poses are reached from the zero configuration in its working mode; or, if no small steps lead to a pose that is
-    a mode of the other, as ``modes`` found the robot assembled there. The start is meant in these working modes; the
-    goal in any, or, where it is given as a mode, with its directions. On the way legs may pass their limits into other
-    working modes (Type 1), but no rod length zero. A certificate encloses, by interval arithmetic, the value of the
-    condition away from zero, the reach of every leg and the limits of R and P joints all along the path, for all poses
-    within ``tolerances.FOLLOWED`` of it. Opposite signs of an expression, at the start and in all working modes of the
-    goal that joint limits allow, separate the two. At most ``budget`` intervals are tried. If nothing can be enclosed
-    the straight path is sampled. ``observe``, ``camera`` and ``sensor`` are as for ``derive``.
+    Returns
+    -------
+    PathAnswer
+        ``same aspect``, ``separated`` or ``undecided``, with the path and the reason.
 
-    Raises ``BadRequest`` for unknown names and parts of a pose, ``PoseNotReached``.
+    Raises
+    ------
+    BadRequest
+        If a name or a part of a pose is unknown.
+    PoseNotReached
+        If start or goal is not reached.
 
-    >>> hrsynth.path("3rrr_m1", start="x=0,y=0,phi=0", goal="x=0.02,y=0,phi=5deg")
-    <PathAnswer: 3rrr_m1, watching 1, 2, 3: same aspect>
+    Notes
+    -----
+    The condition is that of the real robot's velocity relation, which is the exact lift's (theory.md 3). A certified
+    path encloses, by interval arithmetic, the condition's value away from zero, the reach of every leg and the limits
+    of R and P joints, for all poses within ``tolerances.FOLLOWED`` of the path. Legs may pass their limits into other
+    working modes (Type 1), but no rod length zero. All that is observed has a value on the path, in front of the
+    camera or not. Opposite signs of an expression, at the start and in all working modes of the goal that joint limits
+    allow, separate the two. If nothing can be enclosed, the straight path is sampled. Source: proofs.md 9.
+
+    Both poses are reached from the zero configuration in its working mode. If small steps do not lead to a pose that is
+    a mode of the other, it is the assembled mode that ``modes`` finds.
+
+    Examples
+    --------
+    >>> hrsynth.path("3rrr_m1", start="x=0,y=0,phi=0", goal="x=0.02,y=0,phi=5deg").verdict
+    'same aspect'
     """
     wanted = [asked_pose(each) for each in (start, goal)]
     setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed)
@@ -515,7 +558,7 @@ def path(
 def between_poses(
     setup: ObservedRobot, wanted: Sequence[AskedPose], *, any_mode: bool, seed: int = 0, budget: int = BUDGET
 ) -> PathAnswer:
-    """What :meth:`Aspects.join` says of the configurations at a start and a goal."""
+    """Search for a path between the configurations at a start and a goal, see :meth:`PathPlanner.join`."""
     aspects = PathPlanner.of(setup.telling(wanted), seed=seed)
     report("poses")
     first, last = configurations_at(aspects.setup, wanted, by_modes=True)
@@ -523,7 +566,7 @@ def between_poses(
 
 
 def leads(ways: Sequence[PathSegment], start: Place, goal: Place, enclosures: Sequence[ConditionEnclosure]) -> bool:
-    """Whether ways lead from pose to pose and from working mode to working mode without a gap."""
+    """Return True if segments lead from pose to pose and from working mode to working mode without a gap."""
     here, modes = start, list(enclosures[0].forms.modes)
     for way in ways:
         if _gap(here, (way.p, way.R)) > SOLVED:
@@ -539,8 +582,8 @@ def _gap(one: Place, other: Place) -> float:
 
 
 def _why_undecided(found: PlannedPath, enclosures: Sequence[ConditionEnclosure], budget: int) -> str:
-    """Why a plan decides nothing."""
-    used = "the number of intervals is used up" if found.boxes >= budget else "the road map does not join the poses"
+    """Return the reason why a plan decides nothing."""
+    used = "limit of intervals reached" if found.boxes >= budget else "the road map does not join the poses"
     if found.ways:
         return f"no path was proved: {used}; the path shown is proved except for its last part"
     pairs = zip(*(enclosure.forms.subchains for enclosure in enclosures), strict=True)
@@ -549,16 +592,16 @@ def _why_undecided(found: PlannedPath, enclosures: Sequence[ConditionEnclosure],
 
 
 def _ends(any_mode: bool) -> str:
-    """Which ends of a path are meant."""
+    """Return which ends of a path a verdict is about."""
     return (
         "poses, at the goal in each working mode within joint limits"
         if any_mode
-        else ("configurations, each in the working modes that the observed directions there show")
+        else ("configurations, each in the working modes that its observed directions show")
     )
 
 
 def _pointwise(answer: PathAnswer, why: str) -> PathAnswer:
-    """What the two configurations alone tell: a continuous expression of opposite signs separates them."""
+    """Decide from the two configurations alone: opposite signs of a continuous expression separate them."""
     ends = answer.start.value, answer.goal.value
     if answer.signed and ends[0] * ends[1] < 0:
         found = (

@@ -1,9 +1,9 @@
-"""The poses that a path runs through: which point of the platform, whether its turn counts; and its parts, straight
-segments and changes of working mode.
+"""Poses that a path runs through, and its segments: straight ones and changes of working mode.
 
 Lengths in characteristic lengths, base axes. A *pose* is (p, R): the position of the point and the platform's rotation
-(the identity where the turn does not count). A leg changes its working mode on a way out to where its rod and its crank
-or rail are at their limit, and back to the same pose; there the leg leads and the platform follows without turning.
+(the identity where the rotation does not count). A leg changes its working mode on a path out to where its rod and its
+crank or rail are at their limit, and back to the same pose; there the leg leads and the platform follows without
+rotating.
 """
 
 from __future__ import annotations
@@ -26,20 +26,20 @@ from ...results import Value
 from ...tolerances import FOLLOWED
 
 Place = tuple[Array, Array]
-"""A pose: the point (3,) and the platform's rotation (3, 3)."""
+"""Pose: the point (3,) and the platform's rotation (3, 3)."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PathCoordinates(Value):
-    """What changes in a platform's pose: the position of a point, along ``motion.translations``, and its turn, by
-    ``motion.rotations``, where ``turning``; together as many as the robot has freedoms."""
+    """Coordinates of the platform's pose that change: the position of a point, along ``motion.translations``, and its
+    rotation, by ``motion.rotations``, where ``turning``; together as many as the platform dof."""
 
     motion: PlatformMotion
     turning: bool
     length: float
 
     def of(self, configurations: Sequence[ClosedConfiguration]) -> tuple[Array, Array]:
-        """The poses (n, 3) and (n, 3, 3) at configurations."""
+        """Return the poses (n, 3) and (n, 3, 3) at configurations."""
         frames = np.array([at.pose(self.motion.link) for at in configurations])
         p = frames[:, :3, :3] @ self.motion.point + frames[:, :3, 3]
         R = frames[:, :3, :3] if self.turning else np.broadcast_to(np.eye(3), (len(p), 3, 3))
@@ -58,8 +58,8 @@ def path_coordinates(
     dof: int,
     configurations: Sequence[ClosedConfiguration],
 ) -> Iterator[PathCoordinates]:
-    """The whole pose of the platform where its parts are independent, then the positions of joint centres on it that
-    have all of the robot's freedoms."""
+    """Yield the whole pose of the platform if its parts are independent, then the positions of joint centres on it that
+    have the full platform dof."""
     mechanism = decomposition.mechanism
     X_PB = inverse(mechanism.links[mechanism.platform].pose)
     centres = [(X_PB @ np.append(joint.point, 1.0))[:3] for joint in mechanism.joints_of(mechanism.platform)]
@@ -75,7 +75,7 @@ def path_coordinates(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StraightSegment(Value):
-    """A way between two poses: the point on a straight line, the platform about one axis; λ from 0 to 1."""
+    """Straight segment between two poses: the point on a line, the platform about one axis; λ from 0 to 1."""
 
     p: Array
     R: Array
@@ -84,11 +84,11 @@ class StraightSegment(Value):
 
     @classmethod
     def between(cls, one: tuple[Array, Array], two: tuple[Array, Array]) -> StraightSegment:
-        """The way from a pose (3,), (3, 3) to another."""
+        """Return the segment from a pose (3,), (3, 3) to another."""
         return cls(*one, two[0] - one[0], logarithm(two[1] @ one[1].T))
 
     def at(self, fractions: Field) -> tuple[Field, Field]:
-        """Poses (n, 3), (n, 3, 3) at fractions (n,); of balls, with all poses nearer than ``FOLLOWED``."""
+        """Return poses (n, 3), (n, 3, 3) at fractions (n,); of balls, with all poses nearer than ``FOLLOWED``."""
         p = self.p + fractions[:, None] * self.shift
         angle = float(np.linalg.norm(self.turn))
         R: Field = np.broadcast_to(self.R, (len(fractions), 3, 3))
@@ -102,13 +102,13 @@ class StraightSegment(Value):
 
     @property
     def end(self) -> tuple[Array, Array]:
-        """The pose at λ = 1."""
+        """Pose at λ = 1."""
         return self.p + self.shift, exponential(self.turn) @ self.R
 
 
 def poses_between(p: Array, R: Array, q: Array, S: Array, fractions: Array) -> tuple[Array, Array, Array]:
-    """Poses (n, k, 3), (n, k, 3, 3) on the ways from poses (p, R) to (q, S), (n, 3) and (n, 3, 3), at fractions (k,);
-    and the ways' lengths (n,) (characteristic lengths, radians)."""
+    """Return poses (n, k, 3), (n, k, 3, 3) on the segments from poses (p, R) to (q, S), (n, 3) and (n, 3, 3), at
+    fractions (k,); and the segments' lengths (n,) (characteristic lengths, radians)."""
     turns = logarithm(S @ R.transpose(0, 2, 1))
     places = p[:, None] + fractions[:, None] * (q - p)[:, None]
     turned = exponential(fractions[:, None] * turns[:, None]) @ R[:, None]
@@ -117,7 +117,7 @@ def poses_between(p: Array, R: Array, q: Array, S: Array, fractions: Array) -> t
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TurningVector(Value):
-    """A vector that turns about a unit ``axis`` from ``first`` by ``angle``."""
+    """Vector that rotates about a unit ``axis`` from ``first`` by ``angle``."""
 
     first: Array
     axis: Array
@@ -125,12 +125,12 @@ class TurningVector(Value):
 
     @classmethod
     def between(cls, one: Array, two: Array, axis: Array) -> TurningVector:
-        """From a vector to another with the same part along the axis."""
+        """Return the rotation from a vector to another with the same part along the axis."""
         flat = one - axis * float(axis @ one)
         return cls(one, axis, float(np.arctan2(axis @ np.cross(flat, two), flat @ two - (axis @ two) * (axis @ flat))))
 
     def at(self, fractions: Field) -> Field:
-        """The vectors (n, 3) at fractions (n,) of the turn."""
+        """Return the vectors (n, 3) at fractions (n,) of the rotation."""
         along = self.axis * float(self.axis @ self.first)
         flat = self.first - along
         angles = fractions * self.angle
@@ -140,8 +140,9 @@ class TurningVector(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class WorkingModeChange(Value):
-    """A limb's way through its limit at one pose: the foot of its rod turns about ``centre`` or moves straight from one
-    working mode's place to the other's, its rod turns, the platform keeps its turn ``R``; λ from 0 to 1."""
+    """Change of a subchain's working mode at one pose, through its limit: the proximal end of its rod rotates about
+    ``centre`` or moves straight from its place in one working mode to that in the other, its rod rotates, the platform
+    keeps its rotation ``R``; λ from 0 to 1."""
 
     place: Place
     limb: int
@@ -153,21 +154,22 @@ class WorkingModeChange(Value):
 
     @property
     def p(self) -> Array:
-        """The point's position at both ends."""
+        """Position of the point at both ends."""
         return self.place[0]
 
     @property
     def R(self) -> Array:
-        """The platform's turn all along."""
+        """Rotation of the platform all along."""
         return self.place[1]
 
     @property
     def end(self) -> Place:
-        """The pose at λ = 1, the same as at λ = 0."""
+        """Pose at λ = 1, the same as at λ = 0."""
         return self.place
 
     def at(self, fractions: Field) -> tuple[Field, Field, tuple[int, Field]]:
-        """Poses (n, 3), (n, 3, 3) at fractions (n,), and the leading limb with the vector that it carries."""
+        """Return poses (n, 3), (n, 3, 3) at fractions (n,), and the leading subchain with the vector that it
+        carries."""
         if isinstance(self.foot, TurningVector):
             carried = self.centre + self.foot.at(fractions)
         else:
@@ -181,9 +183,10 @@ class WorkingModeChange(Value):
 def mode_change(
     coordinates: PathCoordinates, limb: ClosedFormLeg, number: int, place: Place
 ) -> WorkingModeChange | None:
-    """The way of limb ``number`` to its other working mode at a pose; None where it has none in the platform's motion.
+    """Return the segment of subchain ``number`` to its other working mode at a pose; None if the platform's motion has
+    none.
 
-    Where the platform's point moves in a plane only, the crank turns and the rod swings in that plane.
+    Where the platform's point moves in a plane only, the crank and the rod rotate in that plane.
     """
     if not isinstance(limb, OnCrank | OnRail) or not (limb.tip.follows and coordinates.turning):
         return None

@@ -1,8 +1,8 @@
-"""Ways around singular loci and through legs' limits: the straight one where it is proved, else one over a road map,
-random poses on one side of the locus in several working modes, with roads between neighbours and
-crossings where a leg passes its limit; roads are proved when they are needed.
+"""Paths around singular loci and through legs' limits: the straight one if it is proved, else one over a road map.
 
-Nearest neighbours by SciPy, shortest ways by NetworkX; a road that cannot be proved is taken off the map.
+The road map has random poses on one side of the locus in several working modes, with roads between neighbours and
+crossings where a leg passes its limit; roads are proved when they are needed. Nearest neighbours by SciPy, shortest
+paths by NetworkX; a road that cannot be proved is removed from the map.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class PoseRegion:
-    """Where poses are drawn: boxes of shifts along, and turns about, what the platform can do, around a pose."""
+    """Region of sampled poses: boxes of shifts along, and rotations about, the directions of the platform's motion,
+    around a pose."""
 
     coordinates: PathCoordinates
     centre: Place
@@ -37,7 +38,7 @@ class PoseRegion:
 
     @classmethod
     def around(cls, coordinates: PathCoordinates, p: Array, R: Array) -> PoseRegion:
-        """The region that is wider than known poses (n, 3), (n, 3, 3), around the first."""
+        """Return the region that is wider than known poses (n, 3), (n, 3, 3), around the first."""
         motion = coordinates.motion
         shifts = (p - p[0]) @ motion.translations
         turns = logarithm(R @ R[0].T) @ motion.rotations
@@ -46,12 +47,12 @@ class PoseRegion:
         return exact.wider(REGION_WIDER)
 
     def wider(self, factor: float) -> PoseRegion:
-        """The region grown by a factor; no turn is longer than π."""
+        """Return the region grown by a factor; no rotation is longer than π."""
         limit = np.pi / max(1.0, np.sqrt(len(self.turn)))
         return replace(self, shift=factor * self.shift, turn=np.minimum(factor * self.turn, limit))
 
     def draw(self, rng: np.random.Generator, count: int) -> tuple[Array, Array]:
-        """Random poses (count, 3), (count, 3, 3)."""
+        """Return random poses (count, 3), (count, 3, 3)."""
         motion = self.coordinates.motion
         p = self.centre[0] + (rng.uniform(-1, 1, (count, len(self.shift))) * self.shift) @ motion.translations.T
         turns = (rng.uniform(-1, 1, (count, len(self.turn))) * self.turn) @ motion.rotations.T
@@ -59,28 +60,28 @@ class PoseRegion:
 
 
 DRAWS = 30
-"""Random poses that are drawn for each that is added to a working mode, at most."""
+"""Largest number of random poses for each that is added to a working mode."""
 NEIGHBOURS = 8
 SHEETS = 16
-"""Working modes that are looked at together, at most."""
+"""Largest number of working modes in one map."""
 CROSSINGS = 12
-"""Crossings that are added between two working modes in each round, at most."""
+"""Largest number of crossings that are added between two working modes in each round."""
 HOP = 2.0
-"""Length that a mode_change counts for (characteristic lengths, radians)."""
+"""Length of a change of working mode (characteristic lengths, radians)."""
 ROAD = 400
 """Largest number of intervals for one road."""
 GLANCES = np.linspace(0, 1, 10)
-"""Places of a road that are looked at, in numbers, before it is put on the map."""
+"""Fractions of a road at which it is evaluated in floats before it is added to the map."""
 
 Road = tuple[int, int]
 
 
 @dataclass(eq=False)
 class RoadMap:
-    """Poses, each in a working mode, and the roads between them: what is known of each, and proofs where tried.
+    """Road map: poses, each in a working mode, and the roads between them with their proofs.
 
     The first pose is the start, the second the goal; ``enclosures`` are the condition in each working mode,
-    ``modes_of`` the places in it of each pose's own.
+    ``modes_of`` the index in it for each pose.
     """
 
     region: PoseRegion
@@ -90,10 +91,10 @@ class RoadMap:
     budget: int
     spent: int = 0
     scale: float = 0.0
-    """A usual value of the condition."""
+    """Typical value of the condition."""
     proofs: dict[Road, Proof] = field(default_factory=dict)
     weights: dict[Road, float] = field(default_factory=dict)
-    """Lengths of roads, longer where the condition is weak; infinite where a road leaves reach or side."""
+    """Lengths of roads, longer where the condition is small; infinite where a road leaves reach or side."""
     crossings: dict[Road, WorkingModeChange] = field(default_factory=dict)
 
     @classmethod
@@ -105,19 +106,19 @@ class RoadMap:
         goal: Place,
         budget: int,
     ) -> RoadMap:
-        """A map of two poses in their working modes."""
+        """Return a map of two poses in their working modes."""
         same = enclosures[0].forms.modes == enclosures[1].forms.modes
         return cls(region, list(enclosures[: 1 if same else 2]), [start, goal], [0, 0 if same else 1], budget)
 
     @property
     def side(self) -> float:
-        """The sign of the condition's value at the start."""
+        """Sign of the condition's value at the start."""
         (p, R), enclosure = self.places[0], self.enclosures[self.modes_of[0]]
         return float(np.sign(enclosure.at(p[None], R[None])[1][0]))
 
     def open(self, limbs: Sequence[int]) -> None:
-        """Add the working modes in which some of these limbs differ from the start's; where they are too many, those in
-        which the first of them differ."""
+        """Add the working modes in which some of these subchains differ from the start's; if these are too many, those
+        in which the first of them differ."""
         many = 2 ** len(limbs) > SHEETS
         chosen = (
             [limbs[:k] for k in range(len(limbs) + 1)]
@@ -133,8 +134,8 @@ class RoadMap:
                 self.enclosures.append(replace(self.enclosures[0], forms=chart))
 
     def add(self, region: PoseRegion, rng: np.random.Generator, count: int) -> None:
-        """Up to ``count`` random poses in each working mode, reachable and on the side of the start, with crossings
-        where two working modes have a pose near a limb's limit."""
+        """Add up to ``count`` random poses in each working mode, reachable and on the side of the start, with crossings
+        where two working modes have a pose near a subchain's limit."""
         p, R = region.draw(rng, DRAWS * count)
         reach_margins = self.enclosures[0].forms.at(p, R).reach_margins
         kept = (reach_margins[:, : len(self.enclosures[0].forms.subchains)] > 0).all(axis=1)
@@ -153,7 +154,7 @@ class RoadMap:
                 self._cross((p[i], R[i]), one, two, limb)
 
     def _adjacent(self) -> Iterator[tuple[int, int, int]]:
-        """Working modes that differ in one limb, and that limb."""
+        """Yield working modes that differ in one subchain, and that subchain."""
         modes = np.array([enclosure.forms.modes for enclosure in self.enclosures])
         for one, two in combinations(range(len(modes)), 2):
             apart = np.flatnonzero(modes[one] != modes[two])
@@ -180,12 +181,12 @@ class RoadMap:
             self.weights[here, there] = weight
 
     def road(self, one: int, two: int) -> PathSegment:
-        """The way from a pose to another: straight, or through a limit."""
+        """Return the segment from a pose to another: straight, or through a limit."""
         across = self.crossings.get((one, two))
         return StraightSegment.between(self.places[one], self.places[two]) if across is None else across
 
     def proof(self, one: int, two: int) -> Proof:
-        """The proof of a road, tried once."""
+        """Return the proof of a road, tried once."""
         key = _key(one, two)
         if key not in self.proofs:
             allowed = min(ROAD, self.budget - self.spent)
@@ -194,7 +195,7 @@ class RoadMap:
         return self.proofs[key]
 
     def graph(self) -> nx.Graph:
-        """Roads between neighbours that are open as far as numbers tell, and were not refused."""
+        """Return roads between neighbours that are free in floats, and were not refused."""
         import networkx as nx
 
         modes_of = np.array(self.modes_of)
@@ -210,7 +211,7 @@ class RoadMap:
         return graph
 
     def _survey(self, members: NDArray[np.int_]) -> None:
-        """Look at the roads between neighbours in one working mode."""
+        """Evaluate the roads between neighbours in one working mode."""
         from scipy.spatial import cKDTree
 
         if len(members) < 2:
@@ -222,7 +223,7 @@ class RoadMap:
         self._look(sorted(roads - self.weights.keys()))
 
     def _look(self, roads: Sequence[Road]) -> None:
-        """Find the weights of straight roads in one working mode, of numbers along them."""
+        """Compute the weights of straight roads in one working mode, from values along them."""
         if not roads:
             return
         one, two = np.array(roads).T
@@ -232,7 +233,7 @@ class RoadMap:
         self.weights.update(zip(roads, map(float, found), strict=True))
 
     def _weights(self, sizes: Array, reached: NDArray[np.bool_], values: Array) -> Array:
-        """The weights of roads of these lengths (n,), from reach and values along them (n, k)."""
+        """Return the weights of roads of these lengths (n,), from reach and values along them (n, k)."""
         open_ = np.atleast_2d(reached & (np.sign(values) == self.side)).all(axis=1)
         weakest = np.min(np.abs(np.atleast_2d(values)), axis=1)
         return np.where(open_, sizes * (weakest + self.scale) / weakest, np.inf)
@@ -242,7 +243,7 @@ class RoadMap:
         return np.array(p), np.array(R)
 
     def way(self) -> list[int] | None:
-        """The shortest way from the first place to the second whose roads are all proved."""
+        """Return the shortest path from the first pose to the second whose roads are all proved."""
         import networkx as nx
 
         graph = self.graph()
@@ -256,7 +257,7 @@ class RoadMap:
         return None
 
     def shortened(self, way: list[int]) -> list[int]:
-        """The way with places left out where the road past them is proved too."""
+        """Return the path without the poses that a proved road can leave out."""
         kept, here = [way[0]], 0
         while here < len(way) - 1:
             here = next(j for j in range(len(way) - 1, here, -1) if j == here + 1 or self._past(way[here : j + 1]))
@@ -264,7 +265,7 @@ class RoadMap:
         return kept
 
     def _past(self, part: Sequence[int]) -> bool:
-        """Whether the straight road from the first to the last of a part in one working mode is proved."""
+        """Return True if the straight road from the first to the last of a part in one working mode is proved."""
         if any(self.modes_of[i] != self.modes_of[part[0]] for i in part):
             return False
         road = _key(part[0], part[-1])
@@ -273,8 +274,8 @@ class RoadMap:
         return bool(np.isfinite(self.weights[road])) and self.proof(*road).proved
 
     def nearest(self) -> list[int]:
-        """Over proved roads to a place in the goal's working mode, as near to it as they lead, then straight on; no
-        place where none is proved."""
+        """Return a path over proved roads to a pose in the goal's working mode, as near to it as they lead, then
+        straight on; none if nothing is proved."""
         import networkx as nx
 
         graph: nx.Graph = nx.Graph([road for road, proof in self.proofs.items() if proof.proved])
@@ -297,14 +298,14 @@ def _key(one: int, two: int) -> Road:
 
 
 ROUNDS = ((60, 1.0), (240, 1.5), (960, 2.0))
-"""Poses that are added to the map in each round, and how much wider than at first their region is; of several working
-modes each has its part."""
+"""Number of poses that are added to the map in each round, and the factor by which their region grows; shared by
+several working modes."""
 
 
 @dataclass(frozen=True, eq=False)
 class PlannedPath:
-    """A way from start to goal: its parts with their proofs (all proved, or the last is not; none where nothing leads
-    to the goal's working mode), and intervals used."""
+    """Path from start to goal: its segments with their proofs (all proved, or the last is not; none if nothing leads to
+    the goal's working mode), and intervals used."""
 
     ways: tuple[PathSegment, ...]
     proofs: tuple[Proof, ...]
@@ -312,12 +313,12 @@ class PlannedPath:
 
     @property
     def proved(self) -> bool:
-        """Whether the whole way is proved."""
+        """True if the whole path is proved."""
         return bool(self.proofs) and all(proof.proved for proof in self.proofs)
 
     @property
     def margin(self) -> float:
-        """The smallest enclosed value along the way."""
+        """Smallest enclosed value along the path."""
         return min(proof.margin for proof in self.proofs)
 
 
@@ -330,9 +331,9 @@ def plan(
     seed: int,
     budget: int,
 ) -> PlannedPath:
-    """A way between two places in the working modes of two enclosures, with at most ``budget`` intervals.
+    """Search for a path between two poses in the working modes of two enclosures, with at most ``budget`` intervals.
 
-    In the first round only those limbs pass their limits that differ; then any that can.
+    In the first round only subchains that differ pass their limits; then any that can.
     """
     roads = RoadMap.between(enclosures, region, start, goal, budget)
     straight = roads.modes_of[1] == 0 and roads.proof(0, 1).proved

@@ -1,4 +1,5 @@
-"""A mechanism seen at configurations: which rods, slides and vectors of it follow from the pose, and by which form."""
+"""Mechanism sampled at configurations: which rods, sliders and vectors of it follow from the pose, and by which
+form."""
 
 from __future__ import annotations
 
@@ -40,7 +41,8 @@ from .vector_expressions import (
 
 
 def on_rail(leg: str, tip: PlatformPoint, tips: Array, ends: Array, axis: Array) -> OnRail | None:
-    """The rod from points (n, 3) that move along a base direction to tips (n, 3), or None where it is no rod."""
+    """Return the rod from points (n, 3) that move along a base direction to tips (n, 3), or None if its length
+    changes."""
     rods = np.linalg.norm(tips - ends, axis=1)
     paths = ends - ends[0]
     off = paths - (paths @ axis)[:, None] * axis
@@ -50,7 +52,7 @@ def on_rail(leg: str, tip: PlatformPoint, tips: Array, ends: Array, axis: Array)
 
 
 def on_crank(leg: str, tip: PlatformPoint, tips: Array, ends: Array, on: Array, axis: Array) -> OnCrank | None:
-    """The rod from points (n, 3) that turn about a base axis to tips (n, 3), or None where it is no rod."""
+    """Return the rod from points (n, 3) that rotate about a base axis to tips (n, 3), or None if its length changes."""
     rods = np.linalg.norm(tips - ends, axis=1)
     spokes = ends - on
     height = spokes @ axis
@@ -64,7 +66,7 @@ def on_crank(leg: str, tip: PlatformPoint, tips: Array, ends: Array, on: Array, 
 def sliding(
     leg: str, tip: PlatformPoint, tips: Array, centre: Array, axis: Array | None, directions: Array
 ) -> SlidingRod | None:
-    """The rod with directions (n, 3) that slides through tips (n, 3), or None where it does not."""
+    """Return the rod with directions (n, 3) that slides through tips (n, 3), or None if it does not."""
     D = tips - centre
     if np.max(np.linalg.norm(np.cross(D, directions), axis=1)) < FOLLOWED:
         return SlidingRod(leg, tip, centre=centre)
@@ -79,7 +81,7 @@ def sliding(
 
 @dataclass(frozen=True, eq=False)
 class SampledMechanism:
-    """A mechanism seen at configurations: where points and directions of it are."""
+    """Mechanism at sampled configurations: positions of points and directions of it."""
 
     mechanism: Mechanism
     coordinates: PathCoordinates
@@ -90,7 +92,7 @@ class SampledMechanism:
         return feature.value(poses_at(self.configurations, feature.links))
 
     def rule(self, feature: NamedVector) -> PlatformPoint | None:
-        """How a vector follows from the pose: read from the joints, if that is what samples show, else fitted."""
+        """Return how a vector follows from the pose: read from the joints if samples agree, else fitted."""
         values, places = self.values(feature), self.coordinates.of(self.configurations)
         found = self.derived.rule(feature)
         if found is not None and np.max(np.abs(found.value(*places) - values)) < FOLLOWED:
@@ -98,7 +100,7 @@ class SampledMechanism:
         return platform_point(values, *places)
 
     def subchains(self, leg: Leg) -> Iterator[tuple[ClosedFormLeg, NamedVector]]:
-        """The rods of a leg with the vectors that they carry, each equation once; else its sliding rod."""
+        """Yield the rods of a leg with the vectors that they carry, each equation once; else its sliding rod."""
         seen: list[tuple[Array, Array]] = []
         for tip, spot in self.tips(leg):
             for limb, end in self.rods(leg, tip, spot):
@@ -112,7 +114,7 @@ class SampledMechanism:
             yield from self.slides(leg)
 
     def tips(self, leg: Leg) -> Iterator[tuple[PlatformPoint, BodyPoint]]:
-        """Joint centres of a leg, and the point whose position is told, that the pose alone decides."""
+        """Yield the joint centres of a leg, and the point that gives the position, that follow from the pose alone."""
         for joint in self.joints(leg):
             if self.mechanism.base not in joint.links:
                 spot = self.centre(joint, joint.successor)
@@ -141,7 +143,7 @@ class SampledMechanism:
                 else:
                     found = on_rail(leg.label, tip, tips, ends, axis)
                 if found is not None:
-                    # one link holds the rod's two ends, so that its length is constant
+                    # one link has both ends of the rod, so that its length is constant
                     rod = set(self.derived.holders(spot)) & set(self.derived.holders(end))
                     yield replace(found, fitted=tip.fitted or not rod), end
 
@@ -164,8 +166,8 @@ class SampledMechanism:
                             return
 
     def slide_makes_form(self, foot: Joint, slide: Joint, tip: BodyPoint, limb: SlidingRod) -> bool:
-        """Whether a P joint between a link that holds the foot's centre and one that holds the tip makes the form: its
-        axis passes through both, or stays normal to the foot's axis."""
+        """Return True if a P joint between a link with the proximal centre and one with the tip makes the form: its
+        axis passes through both, or stays normal to the proximal axis."""
         centre = self.centre(foot, self.mechanism.base)
         near, far = self.derived.holders(centre), self.derived.holders(tip)
         if not any(one in near and slide.other(one) in far for one in slide.links):
@@ -176,8 +178,8 @@ class SampledMechanism:
         return foot.type is JointType.REVOLUTE and bool(abs(foot.axis @ slide.axis) <= EXACT)
 
     def closes(self, leg: Leg, carried: Sequence[NamedVector]) -> bool:
-        """Whether the loops inside a leg close where its rods do: pose and limbs decide all joint centres in them. Of
-        other loops (a crank that a rocker drives) the forms say nothing, and they may not reach."""
+        """Return True if the loops inside a leg close where its rods do: pose and subchains determine all joint centres
+        in them. Other loops (a crank driven by a rocker) are not covered by the forms, and may not reach."""
         for name in leg.loop_joints(self.mechanism):
             joint = self.mechanism.joints[name]
             known = (any(self.sources(self.centre(joint, link), carried)) for link in joint.links)
@@ -186,7 +188,8 @@ class SampledMechanism:
         return True
 
     def source(self, feature: NamedVector, carried: Sequence[NamedVector]) -> VectorExpression:
-        """How a vector follows from pose and limbs: read from the joints where that can be, else fitted to samples."""
+        """Return how a vector follows from pose and subchains: read from the joints where possible, else fitted to
+        samples."""
         found = list(self.sources(feature, carried))
         if not found:
             raise NoLegForm(f"{feature.symbol} ({feature.meaning}) does not follow from the pose by a known form")
@@ -224,7 +227,7 @@ class SampledMechanism:
                 yield DerivedVector(*cast(tuple[SimpleVector, SimpleVector, SimpleVector | None], (start, end, axis)))
 
     def lasting(self, feature: Tangent | Segment) -> bool:
-        """Whether the vector of which a feature is the direction keeps its length, so that it never vanishes."""
+        """Return True if the vector of which a feature is the direction keeps its length, so that it never vanishes."""
         along = self.values(feature.end) - self.values(feature.start)
         if isinstance(feature, Tangent):
             along = np.cross(self.values(feature.axis), along)

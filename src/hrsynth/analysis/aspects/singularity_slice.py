@@ -1,15 +1,14 @@
-"""The poses at which one leg of three cranks has its watched direction: a surface that holds all modes, the curve of
+"""Poses at which one leg of three cranks has its observed direction: a surface that contains all modes, the curve of
 Type 2 singularities on it, and its image among the other two directions, with cusps and nodes (proofs.md, section 9).
 
-Cranks w_k about A_k carry rods e_k to the corners T_k = A_k + w_k + e_k = T₀ + r_k, r_k = b_k exp(iφ), k = 0, 1, 2;
-e₀ is held. With n_k = w₀ × w_k and m_k = r_k × w_k the lines through T_k along w_k meet, or are parallel, where
+Cranks w_k about A_k carry rods e_k to the corners T_k = A_k + w_k + e_k = T₀ + r_k, r_k = b_k exp(iφ), k = 0, 1, 2; e₀
+is fixed. With n_k = w₀ × w_k and m_k = r_k × w_k the lines through T_k along w_k meet, or are parallel, where f = m₂ n₁
+− m₁ n₂ = 0.
 
-    f = m₂ n₁ − m₁ n₂ = 0.
-
-There the platform can move while all e_k rest: with v = t i w₀, (t, ω) = (m_k, −n_k), ẇ₀ = v, ṙ_k = ω i r_k and
+There the platform can move while all e_k are constant: with v = t i w₀, (t, ω) = (m_k, −n_k), ẇ₀ = v, ṙ_k = ω i r_k and
 ẇ_k = v + ṙ_k. Let g be the rate of f in this motion. At a regular zero of (f, g) with (t, ω) ≠ 0 the map from the
-surface to the directions of e₁, e₂ has a *cusp* (Whitney): three modes meet, and on a way around it two of them change
-places without a singularity. At a *node* two places of the curve have the same directions. Both are regular zeros of
+surface to the directions of e₁, e₂ has a *cusp* (Whitney): three modes meet, and on a path around it two of them change
+places without a singularity. At a *node* two points of the curve have the same directions. Both are regular zeros of
 polynomial systems in the components of w_k and exp(iφ).
 """
 
@@ -33,14 +32,14 @@ from ..modes.polynomials import krawczyk
 from .three_cranks import ThreeCranks
 
 Numbers = Sequence[Any] | NDArray[Any]
-"""Unknowns: numbers, arrays, balls or jets. Of one place: w₀, exp(iφ), w₁, w₂, two components each."""
+"""Unknowns: numbers, arrays, balls or jets. Of one point: w₀, exp(iφ), w₁, w₂, two components each."""
 
 
 @dataclass(frozen=True)
 class SectionPoint(Record, all_recorded=True):
-    """A place of the surface: the turn of the first crank's w₀ in the plane, that of the platform since the goal, and
-    the directions of e₁, e₂ (rad). ``radius``: of the box that is proved to hold exactly one such point (rad,
-    characteristic lengths), for all geometries within ``tolerances.FOLLOWED``; None where it was found alone."""
+    """Point of the surface: the rotation of the first crank's w₀ in the plane, that of the platform since the goal, and
+    the directions of e₁, e₂ (rad). ``radius``: of the box that is proved to contain exactly one such point (rad,
+    characteristic lengths), for all geometries within ``tolerances.FOLLOWED``; None if it is not proved."""
 
     crank: float
     turn: Annotated[float, As("phi")]
@@ -50,8 +49,8 @@ class SectionPoint(Record, all_recorded=True):
 
 @dataclass(frozen=True, eq=False)
 class SingularitySlice(Record):
-    """The ``curve`` of Type 2 singularities as polylines (n, 4) of crank, turn and two directions (rad), its cusps and
-    its nodes (two places each), as far as they were found."""
+    """Slice of the singularities: ``curve`` of Type 2 singularities as polylines (n, 4) of crank, rotation and two
+    directions (rad), its cusps and its nodes (two points each), as far as they were found."""
 
     robot: ThreeCranks
     held: complex
@@ -59,12 +58,12 @@ class SingularitySlice(Record):
     cusps: Recorded[tuple[SectionPoint, ...]]
     nodes: Recorded[tuple[tuple[SectionPoint, SectionPoint], ...]]
 
-    held_record = Shown(str, lambda self: self.robot.labels[0], As("held"))
+    held_record = Shown(str, lambda self: self.robot.labels[0], As("fixed"))
     directions = Shown(list[str], lambda self: self.robot.labels[1:])
 
 
 def _times(a: Numbers, b: Numbers) -> Any:
-    """a × b of two vectors of the plane."""
+    """Return a × b of two vectors of the plane."""
     return a[0] * b[1] - a[1] * b[0]
 
 
@@ -73,12 +72,12 @@ def _square(a: Numbers) -> Any:
 
 
 def _aside(factor: Any, a: Numbers) -> list[Any]:
-    """i a times a number."""
+    """Return i a."""
     return [-factor * a[1], factor * a[0]]
 
 
 class _Place(NamedTuple):
-    """What one place gives: what must vanish for the lengths, and e_k, r_k, m_k, n_k of k = 1, 2; w_k of all."""
+    """Return the closure error of the lengths, and e_k, r_k, m_k, n_k of k = 1, 2; w_k of all, at one point."""
 
     lengths: list[Any]
     w: tuple[Numbers, ...]
@@ -93,11 +92,11 @@ class _Place(NamedTuple):
         return self.m[1] * self.n[0] - self.m[0] * self.n[1]
 
     def motion(self, pick: int) -> tuple[Any, Any]:
-        """(t, ω) = (m_k, −n_k) of a leg ``pick``, 1 or 2."""
+        """Return (t, ω) = (m_k, −n_k) of a leg ``pick``, 1 or 2."""
         return self.m[pick - 1], -self.n[pick - 1]
 
     def rate(self, pick: int) -> Any:
-        """g: the rate of f in that motion, ṙ_k = ω i r_k and ẇ_k = v + ṙ_k."""
+        """Return g: the rate of f in that motion, ṙ_k = ω i r_k and ẇ_k = v + ṙ_k."""
         t, omega = self.motion(pick)
         v = _aside(t, self.w[0])
         m, n = [], []
@@ -111,15 +110,15 @@ class _Place(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LockedLegSection:
-    """Three cranks with the first rod held at the unit direction ``held``; ``number`` turns their lengths into the
-    numbers that the unknowns are made of (for balls: those that hold all geometries meant)."""
+    """Three cranks with the first rod fixed at the unit direction ``held``; ``number`` turns their lengths into the
+    numbers that the unknowns are made of (for balls: those that contain all geometries within the tolerance)."""
 
     robot: ThreeCranks
     held: complex
     number: Callable[[float], Any] = float
 
     def place(self, x: Numbers) -> _Place:
-        """What unknowns (8,) give."""
+        """Evaluate one point at unknowns (8,)."""
         robot, number = self.robot, self.number
         w, (c, s) = (x[0:2], x[4:6], x[6:8]), x[2:4]
         base = robot.feet[0] + robot.rods[0] * self.held
@@ -139,25 +138,25 @@ class LockedLegSection:
         return _Place(lengths, w, e, r, [_times(r[k], w[k + 1]) for k in (0, 1)], [_times(w[0], w[k]) for k in (1, 2)])
 
     def curve(self, x: Numbers) -> list[Any]:
-        """What vanishes on the curve, (7,)."""
+        """Return the residuals of the curve, (7,)."""
         at = self.place(x)
         return [*at.lengths, at.f]
 
     def cusp(self, x: Numbers, pick: int) -> list[Any]:
-        """What vanishes at a cusp, (8,)."""
+        """Return the residuals of a cusp, (8,)."""
         at = self.place(x)
         return [*at.lengths, at.f, at.rate(pick)]
 
     def node(self, x: Numbers) -> list[Any]:
-        """What vanishes at a node, (16,): the second place has the first one's rods, and so their lengths."""
+        """Return the residuals of a node, (16,): the second point has the first one's rods, and so their lengths."""
         one, two = self.place(x[:8]), self.place(x[8:])
         apart = [a - b for e, h in zip(one.rods, two.rods, strict=True) for a, b in zip(e, h, strict=True)]
         return [*one.lengths, one.f, *two.lengths[:4], two.f, *apart]
 
 
 def section(robot: ThreeCranks, held: complex) -> SingularitySlice:
-    """The curve, its cusps and its nodes: found on a grid of ``budgets.SECTION_STEPS`` turns of crank and platform, and
-    enclosed where Krawczyk's operator proves them."""
+    """Compute the curve, its cusps and its nodes: from a grid of ``budgets.SECTION_STEPS`` rotations of crank and
+    platform, enclosed where Krawczyk's operator proves them."""
     leg, thick = LockedLegSection(robot, held), LockedLegSection(robot, held, _ball)
     traces = list(_traces(leg))
     cusps: list[tuple[Array, SectionPoint]] = []
@@ -165,7 +164,7 @@ def section(robot: ThreeCranks, held: complex) -> SingularitySlice:
         at = leg.place(x)
         pick = 1 + int(np.argmax([np.linalg.norm(at.motion(k)) for k in (1, 2)]))
         found = _newton(partial(leg.cusp, pick=pick), x)
-        # where (t, ω) vanishes f and g do so too, which says nothing
+        # where (t, ω) vanishes f and g do so too, which shows nothing
         if found is None or np.linalg.norm(leg.place(found).motion(pick)) < SAME_SPOT:
             continue
         if any(np.linalg.norm(found - other) < SAME_SPOT for other, _ in cusps):
@@ -205,15 +204,15 @@ def _ball(value: float) -> Any:
 
 
 class _Trace(NamedTuple):
-    """A piece of the curve: unknowns (n, 8), and crank, turn and directions (n, 4)."""
+    """Piece of the curve: unknowns (n, 8), and crank, rotation and directions (n, 4)."""
 
     unknowns: Array
     shown: Array
 
 
 def sheet(robot: ThreeCranks, held: complex, crank: Array, turn: Array, sides: tuple[int, int]) -> Array:
-    """Unknowns (8, ...) where the first crank and the platform have these turns (rad) and the other cranks are on these
-    sides of the lines to their tips; NaN out of reach."""
+    """Return unknowns (8, ...) where the first crank and the platform have these rotations (rad) and the other cranks
+    are on these sides of the lines to their tips; NaN out of reach."""
     w, rotation = [robot.cranks[0] * np.exp(1j * crank)], np.exp(1j * turn)
     for k, side in zip((1, 2), sides, strict=True):
         D = robot.feet[0] + robot.rods[0] * held + w[0] + robot.corners[k] * rotation - robot.feet[k]
@@ -225,7 +224,7 @@ def sheet(robot: ThreeCranks, held: complex, crank: Array, turn: Array, sides: t
 
 
 def _traces(leg: LockedLegSection) -> Iterator[_Trace]:
-    """The pieces of f = 0: each followed from a place where f changes its sign on one of the four sheets."""
+    """Trace the pieces of f = 0: each from a point where f changes its sign on one of the four sheets."""
     ticks = np.linspace(-np.pi, np.pi, SECTION_STEPS + 1)
     crank, turn = np.meshgrid(ticks, ticks, indexing="ij")
     known = np.zeros((0, 8))
@@ -245,7 +244,7 @@ def _traces(leg: LockedLegSection) -> Iterator[_Trace]:
 
 
 def _follow_curve(leg: LockedLegSection, start: Array) -> Array:
-    """Places (n, 8) of a piece of the curve, step by step until it closes; in both directions where it ends."""
+    """Trace points (n, 8) of a piece of the curve until it closes; in both directions if it ends."""
     ways = []
     for sense in (1.0, -1.0):
         here, way, tangent = start, [start], sense * np.linalg.svd(_slopes(leg.curve, start))[2][-1]
@@ -263,20 +262,20 @@ def _follow_curve(leg: LockedLegSection, start: Array) -> Array:
 
 
 def _angles(leg: LockedLegSection, x: Array) -> list[Array]:
-    """Crank, turn and two directions (rad) at unknowns (8, ...)."""
+    """Return crank, rotation and two directions (rad) at unknowns (8, ...)."""
     one, two = leg.place(x).rods
     return [np.arctan2(v[1], v[0]) for v in (x[0:2], x[2:4], one, two)]
 
 
 def _changes(leg: LockedLegSection, trace: _Trace) -> Iterator[Array]:
-    """Places between which the rate of f in the motion that is left changes its sign."""
+    """Yield points between which the rate of f in the remaining motion changes its sign."""
     for pick in (1, 2):
         g = leg.place(trace.unknowns.T).rate(pick)
         yield from trace.unknowns[np.flatnonzero(np.sign(g[1:]) != np.sign(g[:-1]))]
 
 
 def _meetings(traces: Sequence[_Trace]) -> Iterator[Array]:
-    """Pairs of places, (16,), near which images of pieces cross each other."""
+    """Yield pairs of points, (16,), near which images of pieces cross each other."""
     parts = [np.hstack([t.shown[:-1, 2:], t.shown[1:, 2:], t.unknowns[:-1]]) for t in traces]
     segments = np.vstack(parts) if parts else np.zeros((0, 12))
     start, step, places = segments[:, :2], segments[:, 2:4] - segments[:, :2], segments[:, 4:]
@@ -292,7 +291,8 @@ def _meetings(traces: Sequence[_Trace]) -> Iterator[Array]:
 
 
 def _newton(system: Callable[[Numbers], list[Any]], x: Array, enough: float = SOLVED) -> Array | None:
-    """A zero near unknowns (n,), the nearest where there are more unknowns than equations; None where there is none."""
+    """Return a zero near unknowns (n,), the nearest if there are more unknowns than equations; None if there is
+    none."""
     for _ in range(SECTION_ITERATIONS):
         step = np.linalg.lstsq(_slopes(system, x), np.array(system(x), dtype=float))[0]
         x = x - step
@@ -305,7 +305,7 @@ def _newton(system: Callable[[Numbers], list[Any]], x: Array, enough: float = SO
 
 
 def _slopes(system: Callable[[Numbers], list[Any]], x: Array) -> Array:
-    """The Jacobian by complex steps: the system is polynomial."""
+    """Return the Jacobian by complex steps: the system is polynomial."""
     return np.array(system(x[:, None] + COMPLEX_STEP * 1j * np.eye(len(x)))).imag / COMPLEX_STEP
 
 
@@ -318,7 +318,7 @@ class _System:
     known: tuple[Any, list[Any]] | None = None
 
     def slopes(self, x: Sequence[Any]) -> list[list[Any]]:
-        """The Jacobian at balls x (n,)."""
+        """Return the Jacobian at balls x (n,)."""
         if self.known is None or self.known[0] is not x:
             columns = []
             for i in range(self.count):
@@ -336,11 +336,11 @@ class _Row(NamedTuple):
     number: int
 
     def value(self, x: Sequence[Any]) -> Any:
-        """The value at balls x."""
+        """Return the value at balls x."""
         return self.whole.system(x)[self.number]
 
     def slopes(self, x: Sequence[Any]) -> Sequence[Any]:
-        """The derivative by each unknown."""
+        """Return the derivative by each unknown."""
         return self.whole.slopes(x)[self.number]
 
 
@@ -350,7 +350,7 @@ def _rows(system: Callable[[Numbers], list[Any]], count: int) -> list[_Row]:
 
 
 def _point(leg: LockedLegSection, x: Array, box: Sequence[Any] | None) -> SectionPoint:
-    """A place by its unknowns, and the box that was proved."""
+    """Return a point by its unknowns, and the box that was proved."""
     angles = [float(angle) for angle in _angles(leg, x)]
     radius = None if box is None else max(float(abs(ball - float(v)).upper()) for ball, v in zip(box, x, strict=True))
     return SectionPoint(angles[0], angles[1], (angles[2], angles[3]), radius)

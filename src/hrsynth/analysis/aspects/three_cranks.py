@@ -1,6 +1,6 @@
-"""A planar platform whose corners hang on three watched rods, each at the end of a crank: its numbers in the plane.
+"""Planar platform whose corners hang on three observed rods, each at the end of a crank: its numbers in the plane.
 
-With the rods' directions held each corner is on a circle: the hidden 3-ΠR̲R (MMT Table 1), with up to six modes.
+With the rods' directions fixed each corner is on a circle: the hidden 3-ΠR̲R (MMT Table 1), with up to six modes.
 """
 
 from __future__ import annotations
@@ -23,8 +23,9 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True, eq=False)
 class ThreeCranks:
-    """Feet A_k, lengths of cranks l_k and rods d_k, corners b_k counted from the first at the goal's turn, all (3,), in
-    characteristic lengths, points of the plane as complex numbers; ``labels`` of the legs."""
+    """Robot with three cranks: base centres A_k, lengths of cranks l_k and rods d_k, corners b_k relative to the first
+    at the goal's rotation, all (3,), in characteristic lengths, points of the plane as complex numbers; ``labels`` of
+    the legs."""
 
     labels: tuple[str, ...]
     feet: Complex
@@ -35,8 +36,7 @@ class ThreeCranks:
 
 @dataclass(frozen=True, eq=False)
 class CrankPlace:
-    """The robot at one of its poses: cranks w_k and rods e_k (3,) and how far the platform has turned since the goal
-    (rad)."""
+    """Pose of the robot: cranks w_k and rods e_k (3,) and the platform's rotation since the goal (rad)."""
 
     cranks: Complex
     rods: Complex
@@ -46,14 +46,14 @@ class CrankPlace:
 def three_cranks(
     aspects: PathPlanner, configurations: Sequence[ClosedConfiguration]
 ) -> tuple[ThreeCranks, list[CrankPlace]] | str:
-    """The robot in its plane, legs in the order in which they are watched, the first configuration being the goal; and
-    where it is at each of them. Or why it is no such robot."""
+    """Return the robot in its plane, legs in the order in which they are observed, the first configuration being the
+    goal, and its pose at each of them; or the reason why it is not such a robot."""
     setup, pattern = aspects.setup, aspects.pattern
     if aspects.structure.motion != "planar" or not isinstance(pattern, LegPattern):
         return "the platform and its legs do not move in a plane, or have no closed forms"
     labels = [o.leg for o in setup.observed]
     if (len(labels), len(set(labels))) != (3, 3) or setup.mechanism.reference != setup.mechanism.base:
-        return "not three legs, one direction of each, are watched from the base"
+        return "the observations are not one direction of each of three legs, from the base"
     limbs = {limb.label: (k, limb) for k, limb in enumerate(pattern.subchains)}
     chosen = [(k, limb) for k, limb in (limbs[label] for label in labels) if isinstance(limb, OnCrank)]
     if not len(pattern.subchains) == len(chosen) == 3:
@@ -74,7 +74,7 @@ def three_cranks(
         rods = corners - ends
         across = np.linalg.norm(np.cross(rods, seen), axis=1) / np.linalg.norm(rods, axis=1)
         if np.max(across) > SAME_RELATION:
-            return "what is watched of a leg is not its rod"
+            return "the observed direction of a leg is not that of its rod"
         places.append(CrankPlace((ends - feet) @ plane, rods @ plane, float(np.angle((R[0] @ home.T @ x) @ plane))))
         tips.append(corners @ plane)
     cranks, rods = (np.array([getattr(limb, name) for _, limb in chosen]) for name in ("radius", "rod"))
@@ -82,10 +82,10 @@ def three_cranks(
 
 
 def mode_counts(robot: ThreeCranks, held: complex, first: Array, second: Array, steps: int) -> NDArray[np.int_]:
-    """How many modes there are where the second and third rod have these directions (n,), (m,) (rad), (n, m): how often
-    the third corner crosses its circle while the first two go around theirs, looked at in ``steps`` places. The first
-    corner goes as far as the second reaches its circle, ``about`` the line to that circle's centre either way; places
-    are dense at both ends, where the second corner's two ways meet."""
+    """Count the modes where the second and third rod have these directions (n,), (m,) (rad), (n, m): the number of
+    times that the third corner crosses its circle while the first two go around theirs, sampled at ``steps`` points.
+    The first corner goes as far as the second reaches its circle, ``about`` the line to that circle's centre either
+    way; points are dense at both ends, where the two solutions of the second corner meet."""
     hub, arm = robot.feet[0] + robot.rods[0] * held, abs(robot.corners[1])
     ends = robot.feet[2] + robot.rods[2] * np.exp(1j * second)[:, None]
     part = (1 - np.cos(np.pi * np.arange(steps // 2 + 1) / (steps // 2))) / 2

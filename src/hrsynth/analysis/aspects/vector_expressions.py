@@ -1,8 +1,8 @@
-"""Where a vector comes from: the pose, a leg that carries it, or both; and rules read from the joints of a file: which
-point or direction is fixed in several links at once, and how those that the platform carries follow from its pose.
+"""Source of a vector: the pose, a leg that carries it, or both; and rules read from the joints of a file: which point
+or direction is fixed in several links at once, and how those that the platform carries follow from its pose.
 
 A point is fixed in both links of a joint if it lies on the R's axis or is the centre of a U or S; a direction, if the
-joint is a P, or an R or C along it. All of it holds at the zero configuration to ``EXACT``, and hence in motion.
+joint is a P, or an R or C along it. All of it is true at the zero configuration to ``EXACT``, and hence in motion.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from .path_segments import PathCoordinates
 
 
 class NoLegForm(Exception):
-    """Why a pose does not decide what the legs do: the reason, for the answer."""
+    """Legs that do not follow from a pose: the reason, for the answer."""
 
 
 @dataclass(frozen=True, eq=False)
 class LegVector:
-    """A vector that a limb carries: ``sense`` · its vector + ``offset``."""
+    """Vector that a subchain carries: ``sense`` · its vector + ``offset``."""
 
     limb: int
     sense: float
@@ -44,7 +44,7 @@ SimpleVector = PlatformPoint | LegVector
 
 @dataclass(frozen=True, eq=False)
 class DerivedVector:
-    """The unit vector from ``start`` to ``end``, or of ``axis`` × it."""
+    """Unit vector from ``start`` to ``end``, or of ``axis`` × it."""
 
     start: SimpleVector
     end: SimpleVector
@@ -52,26 +52,26 @@ class DerivedVector:
 
     @property
     def fitted(self) -> bool:
-        """Whether one of its parts was."""
+        """True if one of its parts is fitted."""
         return any(part is not None and part.fitted for part in (self.start, self.end, self.axis))
 
 
 @dataclass(frozen=True, eq=False)
 class SightVector:
-    """A vector of what a camera sees: the unit cross product of two ``parts``; or, of a centre, a point and an axis,
-    the normal of the plane through the centre that touches the cylinder of this ``radius``. It has no value just where
-    nothing is seen, and is enclosed nowhere near."""
+    """Vector of what a camera observes: the unit cross product of two ``parts``; or, of a centre, a point and an axis,
+    the normal of the plane through the centre that touches the cylinder of this ``radius``. It has no value only where
+    nothing is visible, and is enclosed nowhere near."""
 
     parts: tuple[VectorExpression, ...]
     radius: float | None = None
 
     @property
     def fitted(self) -> bool:
-        """Whether one of its parts was."""
+        """True if one of its parts is fitted."""
         return any(part.fitted for part in self.parts)
 
     def value(self, *parts: Field) -> Field:
-        """Of those of its parts."""
+        """Return the value for those of its parts."""
         if self.radius is None:
             one, other = parts
             return unit_balls(cross(one, other))
@@ -98,7 +98,7 @@ def value_of(each: VectorExpression, p: Field, R: Field, carried: Sequence[Field
 
 
 def limbs_of(each: Any) -> set[int]:
-    """The limbs whose vectors an expression, or what is made of expressions, follows from."""
+    """Return the subchains on whose vectors an expression, or what is made of expressions, depends."""
     if isinstance(each, LegVector):
         return {each.limb}
     parts = (
@@ -109,8 +109,8 @@ def limbs_of(each: Any) -> set[int]:
 
 @dataclass(frozen=True, eq=False)
 class CarriedLink:
-    """A link that the pose carries: the rule of its ``anchor`` (3,) (at zero, characteristic lengths), and whether it
-    turns with the platform (True), not at all (False), or otherwise (None)."""
+    """Link that the pose carries: the rule of its ``anchor`` (3,) (at zero, characteristic lengths), and whether it
+    rotates with the platform (True), not at all (False), or otherwise (None)."""
 
     rule: PlatformPoint
     anchor: Array
@@ -119,7 +119,7 @@ class CarriedLink:
 
 @dataclass(frozen=True, eq=False)
 class JointRules:
-    """What the joints of a mechanism say of its points and directions; ``bodies``: links that the pose carries."""
+    """Rules of points and directions, read from the joints of a mechanism; ``bodies``: links that the pose carries."""
 
     mechanism: Mechanism
     length: float
@@ -132,8 +132,8 @@ class JointRules:
         coordinates: PathCoordinates,
         configurations: Sequence[ClosedConfiguration],
     ) -> JointRules:
-        """The base, and the platform's links from joint to joint. Which of these turn is seen at configurations; that
-        the joints between them allow it follows from the joints."""
+        """Return the base and the platform's links, from joint to joint. Configurations show which of these rotate;
+        that the joints between them allow it follows from the joints."""
         mechanism, length, link = decomposition.mechanism, coordinates.length, coordinates.motion.link
         frame = mechanism.links[link].pose
         anchor = (frame[:3, :3] @ coordinates.motion.point + frame[:3, 3]) / length
@@ -153,7 +153,7 @@ class JointRules:
         return known
 
     def rule(self, feature: NamedVector) -> PlatformPoint | None:
-        """The rule of a point or direction, where a link that the pose carries holds it too."""
+        """Return the rule of a point or direction, if a link that the pose carries has it too."""
         if isinstance(feature, BodyPoint):
             x = self.zero(feature)
             rules = (self.point(link, x) for link in self.holders(feature) if link in self.bodies)
@@ -168,7 +168,7 @@ class JointRules:
         return None
 
     def point(self, link: str, x: Array) -> PlatformPoint | None:
-        """The rule of a point (3,) (at zero, characteristic lengths) of a link that the pose carries."""
+        """Return the rule of a point (3,) (at zero, characteristic lengths) of a link that the pose carries."""
         body = self.bodies[link]
         arm = x - body.anchor
         if np.linalg.norm(arm) <= EXACT:
@@ -179,14 +179,14 @@ class JointRules:
         return PlatformPoint(body.rule.follows, body.rule.turned + turned, body.rule.constant + constant)
 
     def zero(self, feature: BodyPoint | BodyVector) -> Array:
-        """A point (characteristic lengths) or direction at the zero configuration."""
+        """Return a point (characteristic lengths) or direction at the zero configuration."""
         X = self.mechanism.links[feature.link].pose
         if isinstance(feature, BodyVector):
             return np.asarray(X[:3, :3] @ feature.direction)
         return np.asarray(X[:3, :3] @ feature.place + X[:3, 3] / self.length)
 
     def holders(self, feature: BodyPoint | BodyVector) -> tuple[str, ...]:
-        """The links in which a point or direction is fixed."""
+        """Return the links in which a point or direction is fixed."""
         value, found = self.zero(feature), [feature.link]
         shared = self._same_point if isinstance(feature, BodyPoint) else _same_direction
         for link in found:
@@ -196,7 +196,7 @@ class JointRules:
         return tuple(found)
 
     def same(self, one: NamedVector, other: NamedVector) -> float:
-        """±1 where two points, or directions of this sense, are the same in all configurations; else 0."""
+        """Return ±1 where two points, or directions of this sense, are the same in all configurations; else 0."""
         if (
             type(one) is not type(other)
             or not isinstance(one, BodyPoint | BodyVector)
@@ -217,13 +217,13 @@ class JointRules:
         return _points(joint) and bool(np.linalg.norm(x - joint.point / self.length) <= EXACT)
 
     def _rotate(self, vector: Array) -> Array:
-        """A vector at zero in the platform's frame."""
+        """Return a vector at zero in the platform's frame."""
         link = next(name for name, body in self.bodies.items() if body.rule.follows)
         return np.asarray(self.mechanism.links[link].pose[:3, :3].T @ vector)
 
 
 def _points(joint: Joint) -> bool:
-    """Whether a joint's centre is fixed in both its links."""
+    """Return True if a joint's centre is fixed in both its links."""
     return joint.type in (JointType.REVOLUTE, JointType.UNIVERSAL, JointType.SPHERICAL, JointType.FIXED)
 
 

@@ -1,3 +1,3 @@
-"""The words for two poses and the paths between them."""
+"""Verdicts on two poses and the paths between them."""
 
 SAME, SEPARATED, UNDECIDED = "same aspect", "separated", "undecided"

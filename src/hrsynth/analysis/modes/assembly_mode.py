@@ -1,4 +1,4 @@
-"""An assembly mode of the robot, and how one of a system is read as such."""
+"""Assembly mode of a robot, read from the solution of a system."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from .solve import SystemMode
 
 
 class LegMissed(NamedTuple):
-    """Why a leg of the real robot does not reach a mode, and by how much."""
+    """Leg of the real robot that does not reach a mode: the reason, and by how much it misses."""
 
     leg: str
     miss: Annotated[ReachFailure, FLAT]
@@ -35,16 +35,31 @@ class LegMissed(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AssemblyMode(OfConfiguration, Record):
-    """A pose of the platform with the measurements of the goal.
+    """Pose of the platform with the measured values of the goal.
 
-    The exact pose, of the file's decimals, is within ``shift`` (m) and ``turn`` (rad) of ``pose``, infinite if nothing
-    was proved: its position and its turn, or those of the bodies on which legs end if ``enclosed`` names them;
-    ``residual``: the largest distance of a tip from its curve (characteristic lengths). ``goal``: whether it is the
-    pose itself from which the measurements were taken. ``reachable`` and ``assembly``: whether the whole real robot,
-    including legs that are not watched, closes there within its joints' limits, as in :class:`Assembly` (the first is
-    None if neither was found); ``open`` names the legs that were not closed, ``gears`` the couplings where all legs
-    were, ``beyond`` the joints, ``misses`` what proves that legs cannot be closed. ``type2_distance``: the smallest
-    singular value of Mᵀ there, as ``check`` gives it; None if the robot was not closed, or if there is no Mᵀ.
+    Parameters
+
+    ----------
+    pose
+        Pose of the platform (metres, radians, base frame).
+    shift, turn
+        Distance (m) and rotation (rad) of the exact pose, of the file's decimals, from ``pose`` at most; infinite if
+        nothing is proved. If ``enclosed`` names links, of these.
+    residual
+        Largest distance of a tip from its locus (characteristic lengths).
+    goal
+        True if this is the pose at which the values were measured.
+    reachable, assembly
+        Verdict on the whole real robot, including legs that are not observed: whether it closes there within its joint
+        limits, as in :class:`Assembly`; ``reachable`` is None if neither was found.
+    type2_distance
+        Smallest singular value of Mᵀ there, as of ``check``; None if the robot was not closed, or without Mᵀ.
+    unclosed_legs, open_couplings
+        Legs that were not closed; couplings that were not closed where all legs were.
+    beyond_limits
+        Joints beyond their limits.
+    misses
+        Proofs that legs cannot be closed.
     """
 
     pose: Recorded[Pose]
@@ -61,22 +76,22 @@ class AssemblyMode(OfConfiguration, Record):
     configuration: ClosedConfiguration | None = None
     multiplicity: Recorded[int] = 1
     proved: Recorded[bool] = False
-    """Whether there is exactly one mode within the radius, for all that the file's decimals and closed loops allow."""
+    """True if exactly one mode is within the radius, for all that the file's decimals and closed loops allow."""
     rounded: Recorded[bool] = False
-    """Whether that is proved for the rounded geometry alone, of which the radius then speaks."""
-    match_residual: Annotated[float | None, "how well all legs fit if only some of them place it"] = None
-    """How well all legs fit (characteristic lengths) where more is observed than needed and that is all that is known;
-    the radius is then that of the mode, if it is one."""
+    """True if that is proved for the rounded geometry alone; the radius is then that of the rounded geometry."""
+    match_residual: Annotated[float | None, "residual of all legs if only some of them determine it"] = None
+    """Residual of all legs (characteristic lengths) of an unproved match, with redundant observation; the radius is
+    then that of the mode, if it is one."""
     enclosed: Annotated[tuple[str, ...], As("bodies")] = ()
     length: float = 1.0
     """The robot's characteristic length (m)."""
     bodies: dict[str, Array] | None = None
-    """Poses (4, 4) of the bodies on which legs end, where need be of the controlled one; of a formation of all bodies,
+    """Poses (4, 4) of the links on which legs end, and of the controlled one if needed; of a formation of all links,
     moved by a trivial motion to where they are nearest to the goal's."""
     opposite: Recorded[tuple[str, ...]] = ()
-    """What is seen there as the opposite value: then it is *antipodal* and no mode."""
+    """Observations with the opposite value there: then it is *antipodal*, not a mode."""
     behind: Recorded[tuple[str, ...] | None] = None
-    """What is not in front of the camera by which it is seen; None where no camera with a name sees a point."""
+    """Observed points that are behind their camera; None if no named camera observes a point."""
     open_couplings: Annotated[
         tuple[str, ...], As("open_couplings"), "couplings that were not closed where all legs were"
     ] = ()
@@ -87,12 +102,12 @@ class AssemblyMode(OfConfiguration, Record):
 
     @property
     def left_open(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
-        """What was not closed there: of legs or couplings the noun and the names."""
+        """Noun and names of the legs or couplings that were not closed there."""
         return tuple(each for each in (("leg", self.unclosed_legs), ("coupling", self.open_couplings)) if each[1])
 
     @property
     def radius(self) -> float:
-        """The larger of the shift (characteristic lengths) and the turn (rad)."""
+        """Larger of the shift (characteristic lengths) and the rotation (rad)."""
         return max(self.shift / self.length, self.turn)
 
     radius_record = Shown(Number, lambda self: self.radius, As("radius"), "null if it is not known")
@@ -109,7 +124,7 @@ def found_mode(
     residual: float,
     goal: bool = False,
 ) -> AssemblyMode:
-    """A closed configuration that was found, as a mode of which nothing is proved."""
+    """Return a closed configuration that was found as a mode of which nothing is proved."""
     beyond, X = tuple(outside(at.model, at.q)), at.pose(setup.motion.link)
     found = Assembly(at, (), beyond)
     return AssemblyMode(
@@ -132,7 +147,7 @@ def found_mode(
 
 
 class ModeReader:
-    """Poses of a system read as poses of the robot."""
+    """Reader of a system's poses as poses of the robot."""
 
     def __init__(
         self, setup: ObservedRobot, observation_model: ObservationModel, goal: ClosedConfiguration, made: Model
@@ -143,14 +158,14 @@ class ModeReader:
         self.measured = FixedValuesTask.at(goal.model, goal.q, observation_model.reference, rest.observations).measured
 
     def away(self, mode: SystemMode) -> float:
-        """How far a mode is from the goal (characteristic lengths, differences of rotation matrices)."""
+        """Return the difference of a mode and the goal (characteristic lengths, differences of rotation matrices)."""
         return max(
             pose_difference(X, self.goal.pose(body), self.goal.model.length)
             for body, X in self.made.bodies(mode.q).items()
         )
 
     def read(self, mode: SystemMode, nearest: bool) -> AssemblyMode:
-        """What a mode is for the robot; of all modes the ``nearest`` to the goal can be it."""
+        """Read a mode as one of the robot; of all modes the ``nearest`` to the goal can be it."""
         bodies, size = self.made.bodies(mode.q), self.goal.model.length
         at_goal = nearest and self.away(mode) <= SAME_RELATION
         near = mode.near
@@ -160,7 +175,7 @@ class ModeReader:
         pose = {base: self.goal.pose(base), **bodies}.__getitem__
         antipodal = opposite([each.seen for each in self.seen], self.goal, self.question.reference, pose)
         found = Assembly(self.goal)
-        if antipodal:  # no mode: whether the robot can be assembled is not asked
+        if antipodal:  # not a mode: the assembly of the robot is not computed
             found = Assembly(None, platform=self.assembler.platform(bodies))
         elif self.made.closing is not None:
             at = self.made.closing(mode.q)
@@ -203,11 +218,11 @@ class ModeReader:
         )
 
     def distance(self, at: ClosedConfiguration | None) -> float | None:
-        """The smallest singular value of Mᵀ, where there is one."""
+        """Return the smallest singular value of Mᵀ, or None without Mᵀ."""
         return None if at is None or relation(at, self.question).RI else weakest(at, self.question)
 
     def open(self, at: ClosedConfiguration) -> tuple[str, ...]:
-        """The couplings that do not close where legs do."""
+        """Return the couplings that do not close where legs do."""
         model = self.goal.model
         if not model.mechanism.couplings:
             return ()
@@ -225,15 +240,15 @@ class ModeReader:
         return tuple(name for name, miss in left.items() if abs(miss) > CLOSED) or tuple(left)
 
     def doubt(self, mode: SystemMode) -> float:
-        """How far the bodies' exact poses can be from the system's (characteristic lengths, radians); 0 where nothing
-        was proved of them: the told poses are meant."""
+        """Return how far the links' exact poses can be from the system's (characteristic lengths, radians); 0 if
+        nothing was proved of them: the printed poses count."""
         length = self.goal.model.length
         found = max(mode.shift / length, mode.turn) + self.made.system.error / length
         return found if np.isfinite(found) else 0.0
 
     def radius(self, mode: SystemMode, bodies: dict[str, Array], X: Array) -> tuple[float, float]:
-        """How far the exact pose can be from the pose X (4, 4) that is told (m, rad): the system's, with what its frame
-        at the goal may be off, and what the told pose is from the system's; of the bodies where X is none of theirs."""
+        """Return how far the exact pose can be from the printed pose X (4, 4) (m, rad): the system's error, that of its
+        frame at the goal, and the difference of both; of the links if X is not one of theirs."""
         first, error = next(iter(bodies.values())), self.made.system.error
         shift, turn = mode.shift + error, mode.turn + error / self.goal.model.length
         told = bodies.get(self.motion.link)

@@ -1,4 +1,4 @@
-"""How many poses of a rigid body six conditions on its points leave, at most (docs/pages/proofs.md, section 8).
+"""Root bound of poses of a rigid body under six conditions on its points (docs/pages/proofs.md, section 8).
 
 A pose is a point (h : M : x : y : r) of P¹⁶ with M = h R, x = h Rᵀp, y = h p, r = h |p|². Such points and their limits
 are an irreducible variety X of dimension 6 and degree 40 (M. Gallet, G. Nawratil, J. Schicho, J. Geom. 106, 2015;
@@ -49,7 +49,7 @@ _Pair = tuple[_Name, _Name]
 
 @dataclass(frozen=True)
 class Bound:
-    """At most so many isolated poses, none besides if that many are, and why.
+    """Root bound of isolated poses, exact if that many are isolated, and its proof.
 
     ``law``: ``degree`` where solutions at infinity count among them, ``quadrics``, ``places`` or ``product``.
     """
@@ -81,8 +81,8 @@ class _Condition:
 
 
 def least_bound(system: System, legs: Sequence[int]) -> Bound | None:
-    """How many complex poses meet the conditions of a choice of legs, as many as freedoms, at most where they are
-    finitely many, and why; None where that is not known."""
+    """Return a bound of the complex poses that meet the conditions of as many legs as dof, if they are finitely many,
+    and its proof; None if it is not known."""
     if sum(system.forbids[k] for k in legs) != system.freedoms:
         return None
     if isinstance(system, Spatial):
@@ -110,7 +110,7 @@ def _of_a_body(system: Spatial, legs: Sequence[int]) -> Bound:
     curves = [system.curves[k] for k in legs]
     if sorted(system.forbids[k] for k in legs) == [1, 2, 3]:
         return Bound(
-            4, "two places of a tip on its curve, two turns about the line to the tip at rest for each", "places"
+            4, "two positions of a tip on its curve, for each two rotations about the line to the fixed tip", "places"
         )
     if any(isinstance(curve, Point) for curve in curves) or all(isinstance(curve, Line | Plane) for curve in curves):
         # with planes p is a linear function of R
@@ -218,7 +218,7 @@ class _Double:
     m: Any
 
     def apart(self, other: _Double) -> bool:
-        """Whether two of them are surely not one."""
+        """Return True if two of them are surely different."""
         tests = [
             *np.cross(self.v, other.v),
             *np.cross(self.u, other.u),
@@ -228,7 +228,7 @@ class _Double:
         return any(not each.contains(0) for each in tests)
 
     def solves_alone(self, rows: Sequence[_Condition]) -> bool:
-        """Whether no other solution is near."""
+        """Return True if no other solution is near."""
         from flint import acb, acb_mat
 
         table = []

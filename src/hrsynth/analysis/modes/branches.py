@@ -33,9 +33,9 @@ class Model(Value):
     bodies: Callable[[Array], dict[str, Array]]
     home: Array
     back: bool = False
-    """Whether the system's pose is that of the base, as the platform sees it."""
+    """True if the system's pose is that of the base, relative to the platform."""
     closing: Callable[[Array], ClosedConfiguration] | None = None
-    """The whole robot at the system's coordinates, where these tell it."""
+    """Whole robot at the system's coordinates, if these determine it."""
     confined: TipLoci | None = None
     """The curves of the tips, where these give the system."""
 
@@ -59,8 +59,8 @@ def _translating(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, .
 
 
 def _rigid(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -> Model:
-    """q is counted from the goal: the frame of the plane of motion (in space: the base's) lies at the first body's
-    origin there."""
+    """q is relative to the goal: the frame of the plane of motion (in space: the base's) is at the first link's origin
+    there."""
     p, n = at[confined.bodies[0]][:3, 3], confined.plane if confined.motion == "planar" else None
     X_goal = pose(p)
     if n is not None:
@@ -149,7 +149,7 @@ def solve_all(confined: TipLoci, *, near: bool = True, time_limit: float = EFFOR
     if first.seconds > time_limit:
         raise TooLarge(
             "a system of equations",
-            f"{len(first.curves)} legs and {first.freedoms} freedoms",
+            f"{len(first.curves)} legs and {first.freedoms} dof",
             first.seconds,
             time_limit,
         )
@@ -166,11 +166,11 @@ def solve_all(confined: TipLoci, *, near: bool = True, time_limit: float = EFFOR
     doubts += [] if confined.doubt is None else [confined.doubt]
     if total > len(made):
         doubts.append(
-            f"only {len(made)} of {total} choices of the legs' branches were solved: all would need about "
-            f"{total * first.seconds:g} s, and the effort is {time_limit:g} s"
+            f"only {len(made)} of {total} combinations of leg solutions were solved: all would need about "
+            f"{total * first.seconds:g} s, and the time limit is {time_limit:g} s"
         )
     if doubts and modes.continuous_family is None:
-        proof = f"{modes.proof}; there may be other branches ({'; '.join(doubts)})"
+        proof = f"{modes.proof}; there may be other leg solutions ({'; '.join(doubts)})"
         modes = replace(modes, complete=False, bound="none", proof=proof)
     return made[0], modes
 
@@ -193,7 +193,7 @@ def together(found: Sequence[SystemModes], branches: Mapping[str, int], size: fl
     """One list of the modes of several systems, the goal's own first; a pose that is in two of them counts once.
     ``branches``: how many each leg has.
 
-    A continuum on the goal's own branches is all that is told; on others it leaves the list open.
+    A continuous family on the goal's own leg solutions is the whole result; on others it leaves the list open.
     """
     if len(found) == 1 or found[0].continuous_family is not None:
         return found[0]
@@ -205,14 +205,14 @@ def together(found: Sequence[SystemModes], branches: Mapping[str, int], size: fl
     counts = [f"{each} complex in {count}" for each, count in Counter(each.complex for each in found).items()]
     proofs = [f"{count} × ({text})" if count > 1 else text for text, count in Counter(e.proof for e in found).items()]
     proof = (
-        f"{len(found)} choices of the held legs' branches ({legs}), {', '.join(counts)}"
+        f"{len(found)} combinations of the locked legs' solutions ({legs}), {', '.join(counts)}"
         + (f", {twice} in two of them" if twice else "")
         + (f", {unclear} pairs not distinguished" if unclear else "")
         + f": {'; '.join(proofs)}"
     )
     special = found[0].singular_solutions or next(
         (
-            f"on other branches of the legs: {each.singular_solutions}"
+            f"for other leg solutions: {each.singular_solutions}"
             for each in found
             if each.singular_solutions is not None
         ),
@@ -245,5 +245,5 @@ def _once(modes: Sequence[SystemMode], size: float) -> tuple[SystemMode, ...]:
 
 
 def _apart(one: SystemMode, other: SystemMode, size: float) -> float:
-    """How far two poses are apart (sizes, entries of the rotations)."""
+    """Return the difference of two poses (sizes, entries of the rotations)."""
     return pose_difference(one.pose, other.pose, size)

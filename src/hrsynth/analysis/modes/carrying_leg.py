@@ -1,4 +1,4 @@
-"""The leg that carries a platform, and what the others and sensors ask of it, read from a robot."""
+"""Leg that carries a platform, and the conditions of other legs and sensors on it, read from a robot."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ from .observation_loci import conditions, sights
 
 
 def carried_platform(measured: MeasuredRobot, goal: ClosedConfiguration, error: float) -> CarriedPlatform:
-    """The platform on that leg which leaves fewest zeros. Raises ``UnsupportedLocus`` where none carries it, or what
-    the others ask is not known."""
+    """Return the platform on the leg that gives the fewest zeros. Raises ``UnsupportedLocus`` if none carries it, or if
+    the conditions of the others are not known."""
     decomposition, name = measured.setup.decomposition, measured.setup.robot.name
     body, middle = rigid_platform(measured, goal)
     rest, seen = sights(decomposition, measured.observation_model, goal)
@@ -40,7 +40,7 @@ def carried_platform(measured: MeasuredRobot, goal: ClosedConfiguration, error: 
                 if other is not leg:
                     branches, off = leg_conditions(decomposition, other, rest, goal, middle)
                     if len(branches) > 1:
-                        raise UnsupportedLocus(name, f"leg {other.label} has {len(branches)} branches")
+                        raise UnsupportedLocus(name, f"leg {other.label} has {len(branches)} solutions")
                     told += [(c, len(freedoms)) for c in branches[0]]
                     moved += off
         except UnsupportedLocus as refused:
@@ -58,7 +58,7 @@ def carried_platform(measured: MeasuredRobot, goal: ClosedConfiguration, error: 
         if turns and np.abs(off_).max(initial=0.0) <= SAME_RELATION and each.square:
             found.append(each)
         else:
-            reason = "the conditions of its legs do not decide its pose one by one"
+            reason = "the conditions of its legs do not determine isolated poses"
     if not found:
         raise UnsupportedLocus(name, reason)
     return min(found, key=lambda each: each.most(each.square))
@@ -125,11 +125,11 @@ def _rows(axes: Sequence[Array]) -> Array:
 def freedoms_of(
     joint: Joint, at: str, goal: ClosedConfiguration, middle: OriginAndUnit, held: Sequence[str]
 ) -> list[Turn]:
-    """What a joint of R and P leaves free that is met from a link, none if it is ``held``. Raises
+    """Return the unlocked axes of a joint of R and P, seen from a link, none if it is ``held``. Raises
     ``UnsupportedLocus``."""
     turns = {JointType.REVOLUTE: 1, JointType.UNIVERSAL: 2, JointType.CYLINDRICAL: 1, JointType.PRISMATIC: 0}
     if joint.type not in turns or held.count(joint.name) not in (0, joint.type.freedoms):
-        raise UnsupportedLocus(goal.model.mechanism.name, f"joint {joint.name} is not one of R and P")
+        raise UnsupportedLocus(goal.model.mechanism.name, f"joint {joint.name} is not R or P")
     point, axes = carry_joint(goal.model.mechanism, joint, goal.pose)
     found = list[Turn]()
     for axis in () if joint.name in held else axes if joint.predecessor == at else axes[::-1]:
@@ -141,8 +141,8 @@ def freedoms_of(
 def _carrier(
     measured: MeasuredRobot, leg: Leg, rest: ObservationModel, goal: ClosedConfiguration, middle: OriginAndUnit
 ) -> tuple[tuple[Turn, ...], list[tuple[PoseCondition, int]]]:
-    """The joints of a leg that are not held, from the base, and what is measured of it, with how many of them carry
-    it."""
+    """Return the unlocked joints of a leg, from the base, and its observations, with the number of joints that carry
+    each."""
     decomposition, mechanism = measured.setup.decomposition, measured.setup.decomposition.mechanism
     own = [each for each in rest.observations if each.leg == leg.label]
     held = [each.joint for each in own if isinstance(each, Encoder)]
@@ -167,7 +167,7 @@ def _carrier(
             or (each.seen_from or rest.reference) != mechanism.base
         ):
             raise UnsupportedLocus(
-                mechanism.name, f"what is measured at leg {leg.label} is not a direction seen from the base"
+                mechanism.name, f"the observation of leg {leg.label} is not a direction from the base"
             )
         d = goal.pose(each.link)[:3, :3] @ each.direction
         told += [

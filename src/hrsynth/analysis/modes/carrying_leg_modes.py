@@ -1,4 +1,4 @@
-"""All modes of a platform that one leg carries: as many closings as there may be, each in a box of its own."""
+"""Modes of a platform that one leg carries: as many solutions as there may be, each in a box of its own."""
 
 from __future__ import annotations
 
@@ -112,10 +112,12 @@ def polish_zeros(system: CarriedPlatform, q: Array, known: Iterable[Array] = ())
 
 
 def solve_carried(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0) -> tuple[Model, SystemModes]:
-    """All modes, with the goal known to ``error`` (m). Raises ``UnsupportedLocus``, and ``Unsolved`` where not all
-    zeros are enclosed that there may be."""
+    """List all modes, with the goal known to ``error`` (m). Raises ``UnsupportedLocus``, and ``SystemNotSolved`` if not
+    all zeros that there may be are enclosed."""
     if not np.isfinite(error):
-        raise UnsupportedLocus(measured.setup.robot.name, "no distance bounds how far it is from where its loops close")
+        raise UnsupportedLocus(
+            measured.setup.robot.name, "the distance to the exact closed configuration is not bounded"
+        )
     system = carried_platform(measured, goal, error)
     (body,) = leg_ends(measured.setup.decomposition)
     return Model(system, lambda q: {body: system.pose(q)}, system.home), _judge(system)
@@ -169,7 +171,7 @@ def _judge(system: CarriedPlatform) -> SystemModes:
     n, most = len(system.freedoms_), system.most(system.square)
     size = f"{n} joint{'s' * (n > 1)} of the leg that carries the platform"
     if most > LARGEST_LOOPS:
-        raise SystemNotSolved("the leg", f"{size}: up to {most} closings, too many (at most {LARGEST_LOOPS})")
+        raise SystemNotSolved("the leg", f"{size}: up to {most} solutions, too many (at most {LARGEST_LOOPS})")
     why, bound = "degrees in each (Bézout)", "class"
     boxes = enclose_zeros(system, proposals(system, most)) if n <= FEW_JOINTS else []
     if len(boxes) < most and (counted := closings_bound(system, system.square)) is not None:
@@ -179,14 +181,14 @@ def _judge(system: CarriedPlatform) -> SystemModes:
         boxes += _far(system, proposed, boxes)
     at_goal = [box for box in boxes if box.real and box.holds(system.unknowns(system.home))]
     if len(boxes) != most or len(at_goal) != 1:
-        raise SystemNotSolved("the leg", f"{size}: of {most} closings at most ({why}) {len(boxes)} have boxes")
+        raise SystemNotSolved("the leg", f"{size}: of {most} solutions at most ({why}) {len(boxes)} have boxes")
     bodies = [_body(system, box) for box in boxes]
     if any(
         all((a - b).contains(0) for a, b in zip(one, other, strict=True))
         for k, one in enumerate(bodies)
         for other in bodies[:k]
     ):
-        raise SystemNotSolved("the leg", f"{size}: several of {most} closings have one pose of the platform")
+        raise SystemNotSolved("the leg", f"{size}: several of {most} solutions have one pose of the platform")
     besides = [system.equation(each) for each in system.told if each not in system.square]
     real = [box for box in boxes if box.real]
     with ctx.workprec(PRECISION):
@@ -195,7 +197,7 @@ def _judge(system: CarriedPlatform) -> SystemModes:
         ]
         modes = [as_mode(system, box, not besides or box is at_goal[0]) for box in kept]
     proof = (
-        f"{size}: at most {most} closings by {why}, {len(boxes)} enclosed apart from each other, complex ones "
+        f"{size}: at most {most} solutions by {why}, {len(boxes)} enclosed, all distinct, complex ones "
         f"too{told_far(boxes)}, {len(real)} real"
     )
     if not besides:

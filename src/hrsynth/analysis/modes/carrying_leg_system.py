@@ -36,7 +36,7 @@ class Turn:
     slides: bool
 
     def maps(self, of: Any) -> tuple[Any, Any, Any]:
-        """What does not depend on its angle, and what c and s multiply; shape (3, 3) each."""
+        """Parts that do not depend on its angle, and that c and s multiply; shape (3, 3) each."""
         along = np.outer(self.axis, self.axis)
         return of(along), of(np.eye(3) - along), of(hat(self.axis))
 
@@ -54,8 +54,8 @@ class CarriedCondition:
 
     @classmethod
     def of(cls, condition: PoseCondition, freedoms: Sequence[Turn]) -> CarriedCondition:
-        """With the joints before which nothing turns what the base tells, or after which nothing turns what is told of
-        the body."""
+        """With the joints before which nothing rotates the base point, or after which nothing rotates the point of the
+        body."""
         idle, off = set[int](), 0.0
         for order, misses in ((range(len(freedoms)), _before), (range(len(freedoms))[::-1], _after)):
             for k in order:
@@ -80,7 +80,8 @@ class CarriedCondition:
 
 
 def _before(c: PoseCondition, freedom: Turn) -> float:
-    """How far a joint next to the base is from changing nothing of a condition; infinite where it is none such."""
+    """Return how far a joint next to the base is from leaving a condition unchanged; infinite if it is of another
+    kind."""
     a = freedom.axis
     if isinstance(c, OnPlane):
         return abs(float(c.n @ a)) if freedom.slides else float(np.linalg.norm(np.cross(c.n, a)))
@@ -93,7 +94,7 @@ def _before(c: PoseCondition, freedom: Turn) -> float:
 
 
 def _after(c: PoseCondition, freedom: Turn) -> float:
-    """The same of a joint next to the body."""
+    """Return that distance for a joint next to the body."""
     a, turned = freedom.axis, float(np.linalg.norm(np.cross(c.c, freedom.axis)))
     if freedom.slides:
         return 0.0 if isinstance(c, AtAngle) else np.inf
@@ -101,7 +102,7 @@ def _after(c: PoseCondition, freedom: Turn) -> float:
 
 
 def _sphere(c: PoseCondition) -> bool:
-    """Whether it tells a distance and no height."""
+    """Return True if it is a distance, not a height."""
     return isinstance(c, OnRevolution) and float(c.f[2]) == -1.0 and float(c.f[1]) == 0.0
 
 
@@ -160,11 +161,11 @@ class CarriedPlatform(System):
     """The platform at the goal (4, 4)."""
     seen: tuple[PlatformObservation, ...] = field(default=(), kw_only=True)
     rows: Array = field(default_factory=lambda: np.eye(3), kw_only=True)
-    """Turns and conditions are told along these (3, 3)."""
+    """Rotations and conditions are relative to these axes (3, 3)."""
 
     @property
     def carrying(self) -> int:
-        """How many of the joints carry the platform."""
+        """Number of joints that carry the platform."""
         return len(self.freedoms_)
 
     @property
@@ -223,7 +224,7 @@ class CarriedPlatform(System):
         return np.stack(values, axis=-1), np.stack(slopes, axis=-2)
 
     def most(self, chosen: Sequence[CarriedCondition]) -> int:
-        """How many isolated common zeros some conditions, as many as joints, have at most."""
+        """Return a bound of the isolated common zeros of as many conditions as joints."""
         n = len(self.freedoms_)
         degrees = np.array([[each.degree(k, f) for k, f in enumerate(self.freedoms_)] for each in chosen])
         alike = [i for i, each in enumerate(chosen) if _sphere(each.condition)]
@@ -244,9 +245,9 @@ class CarriedPlatform(System):
         return min(found)
 
     def _meets(self, one: CarriedCondition, other: CarriedCondition) -> bool:
-        """Whether two conditions hold one point, and give where the first joint turns what is across its axis:
-        N R η = A with |R η| = |η|, so |N⁻¹ A|² = |η|², of degree two in the other joints' c and s, and one turn for
-        each zero."""
+        """Return True if two conditions fix one point, and give the rotation of the first joint about its axis: N R η =
+        A with |R η| = |η|, so |N⁻¹ A|² = |η|², of degree two in the other joints' c and s, and one turn for each
+        zero."""
         o, a = self.freedoms_[0].point, self.freedoms_[0].axis
         if self.freedoms_[0].slides or one.joints != other.joints or np.any(one.condition.b != other.condition.b):
             return False

@@ -1,7 +1,7 @@
 """Polynomial conditions of a leg on the pose of a rigid platform, read from its joints, all branches of it.
 
 A pose is (R, p): the platform's point b is at x = p + R b, its direction c at d = R c; at the goal R = 1, p = 0. A
-condition is a polynomial in x and d, so one in (R, p), of the *degree* told, where the entries of R and p count one.
+condition is a polynomial in x and d, so one in (R, p), of the given *degree*, where the entries of R and p count one.
 Lengths are in sizes of the robot, counted from its middle.
 """
 
@@ -37,7 +37,7 @@ class PoseCondition:
         return np.asarray(found / np.linalg.norm(found))
 
     def value(self, x: Any, d: Any, of: Convert) -> Any:
-        """Of x and d, shape (..., 3), numbers made from floats by ``of``."""
+        """Value at x and d, shape (..., 3), of numbers made from floats by ``of``."""
         raise NotImplementedError
 
     def slopes(self, x: Any, d: Any, of: Convert) -> tuple[Any, Any]:

@@ -1,4 +1,4 @@
-"""What the solver asks of a platform whose tips are confined.
+"""Platform whose tips are confined, as the solver needs it.
 
 A system knows its poses, q, how far the tips of a pose miss what they can reach, its *squares*: the choices of legs on
 curves that give as many equations as unknowns, and its *chart*: coordinates of the pose in which all conditions are of
@@ -32,54 +32,54 @@ class System(Value):
     curves: tuple[Reach, ...]
     tips: Array
     error: float = field(default=0.0, kw_only=True)
-    """How far a point that the numbers give can be from that of the exact input (m), besides rounding: closed loops."""
+    """Distance of a point from that of the exact input (m), besides rounding: closed loops."""
     as_written: bool = field(default=False, kw_only=True)
-    """Whether the numbers count as they are, and no special geometry is meant."""
+    """True if the numbers count as they are, without special geometry."""
 
     freedoms: ClassVar[int]
-    """How many coordinates a pose has; the first d are lengths (m), the others angles (rad)."""
+    """Number of coordinates of a pose; the first d are lengths (m), the others angles (rad)."""
     space: ClassVar[int] = 3
-    """d: in how many directions a tip moves."""
+    """d: number of directions in which a tip moves."""
     rigid: ClassVar[bool] = True
-    """Whether all tips are those of one body that turns, and the points solved for theirs."""
+    """True if all tips are those of one body that rotates, and the points solved for theirs."""
 
     def __post_init__(self) -> None:
         tips = frozen(self.tips)
         if tips.shape != (len(self.curves), self.space) or not np.all(np.isfinite(tips)):
             raise BadRequest(
-                "tips of a platform", list(tips.shape), f"{len(self.curves)} by {self.space} finite numbers"
+                "shape of a platform's tips", list(tips.shape), f"{len(self.curves)} by {self.space} finite numbers"
             )
         object.__setattr__(self, "tips", tips)
 
     @cached_property
     def size(self) -> float:
-        """What residuals are divided by (m)."""
+        """Unit of residuals (m)."""
         return extent(self.curves, self.tips)
 
     @cached_property
     def forbids(self) -> tuple[int, ...]:
-        """How many equations each leg gives."""
+        """Number of equations of each leg."""
         return tuple(self.space - curve.freedoms for curve in self.curves)
 
     @property
     def seconds(self) -> float:
-        """How long its list takes on one core, about."""
+        """Estimated time of its list on one core (s)."""
         if not self.surfaces:
             return ELIMINATION_SECONDS
         return HOMOTOPY_SECONDS if self.rigid else MSOLVE_SECONDS
 
     @property
     def missing(self) -> int:
-        """Freedoms that too few legs leave: the dimension of the continuum, 0 where there are legs enough."""
+        """Dof that too few legs leave: the dimension of the continuous family, 0 if there are enough legs."""
         return self.freedoms_left(range(len(self.curves)))
 
     def freedoms_left(self, legs: Sequence[int]) -> int:
-        """Freedoms that some legs leave."""
+        """Return the dof that some legs leave."""
         return max(0, self.freedoms - sum(self.forbids[k] for k in legs))
 
     @property
     def surfaces(self) -> bool:
-        """Whether a tip is confined to a surface only."""
+        """True if a tip is confined to a surface only."""
         return len(curves_of(self.curves)) < len(self.curves)
 
     @property
@@ -101,29 +101,29 @@ class System(Value):
     def apart(
         self, q: Array, at: Array, legs: Sequence[int], points: Sequence[tuple[Array, float]]
     ) -> dict[int, float]:
-        """How far the tips of some legs can be from those at q (m), which are ``at`` (legs, 3), with the point on each
-        leg's curve and how far the exact one is from it (m); a tip at rest has no such point."""
+        """Return how far the tips of some legs can be from those at q (m), which are ``at`` (legs, 3), with the point
+        on each leg's curve and how far the exact one is from it (m); a fixed tip has no such point."""
         error = self.error + TIP_ROUNDING * self.size
         return {k: miss + length(point - at[k]) + error for k, (point, miss) in self.known_tips(legs, points).items()}
 
     def known_tips(self, legs: Sequence[int], points: Sequence[tuple[Array, float]]) -> dict[int, tuple[Array, float]]:
-        """The ``points`` of those of some legs that are not at rest, in their order, and the places of those that
+        """Return the ``points`` of those of some legs that are not fixed, in their order, and the indices of those that
         are."""
         resting = [k for k in legs if isinstance(self.curves[k], Point)]
         known = {k: (self.curves[k].centre, 0.0) for k in resting}
         return known | dict(zip((k for k in legs if k not in resting), points, strict=False))
 
     def spread(self, q: Array, apart: Mapping[int, float]) -> tuple[float, float]:
-        """How far the platform's frame (m) and turn (rad) can be from those at q, with tips within the distances
-        ``apart`` from theirs (m)."""
+        """Return how far the platform's frame (m) and rotation (rad) can be from those at q, with tips within the
+        distances ``apart`` from theirs (m)."""
         raise NotImplementedError
 
     def misses(self, q: Array) -> Array:
-        """What separates each tip from what it can reach at a pose; shape (legs, 3), metres."""
+        """Return the difference between each tip and its locus at a pose; shape (legs, 3), metres."""
         return self.off(self.tips_at(q))
 
     def off(self, at: Array) -> Array:
-        """What separates tips ``at`` (legs, 3) from what they can reach; shape (legs, 3), metres."""
+        """Return the difference between tips ``at`` (legs, 3) and their loci; shape (legs, 3), metres."""
         return np.array([curve.miss(tip) for curve, tip in zip(self.curves, at, strict=True)])
 
     def residual(self, at: Array) -> float:
@@ -141,7 +141,7 @@ class System(Value):
         return origin
 
     def tips_at(self, q: Array) -> Array:
-        """Where the tips are at a pose; shape (legs, 3), metres."""
+        """Return the positions of the tips at a pose; shape (legs, 3), metres."""
         raise NotImplementedError
 
     def pose(self, q: Array) -> Array:
@@ -158,8 +158,8 @@ class System(Value):
 
 
 def register(tips: Array, apart: Mapping[int, float], arrows: int = 0) -> tuple[float, float]:
-    """How far the origin of a rigid body (m) can be moved and how far the body turned (rad), at most, where its points
-    ``tips`` (n, d) are moved by at most the distances ``apart`` (m); the last ``arrows`` only turn with it.
+    """Return how far the origin of a rigid body (m) can be moved and how far the body rotated (rad), at most, if its
+    points ``tips`` (n, d) are moved by at most the distances ``apart`` (m); the last ``arrows`` only turn with it.
 
     With the points' mean c, a turn φ about a unit n moves b − c by 2 sin(φ/2) |n × (b − c)| against the mean, and an
     arrow as if it were b − c; the sum of |n × (b − c)|² is at least that of |b − c|² less the largest eigenvalue of
@@ -178,8 +178,8 @@ def register(tips: Array, apart: Mapping[int, float], arrows: int = 0) -> tuple[
 
 @lru_cache(maxsize=64)
 def _spread(points: tuple[tuple[float, ...], ...], arrows: tuple[tuple[float, ...], ...]) -> tuple[float, float]:
-    """How far the mean of points is from the origin, and the least sum of squared distances of the points to an axis
-    through it (a point of the plane), and of arrows that start there."""
+    """Return how far the mean of points is from the origin, and the least sum of squared distances of the points to an
+    axis through it (a point of the plane), and of arrows that start there."""
     b = np.array(points)
     mean = b.mean(axis=0)
     C = np.vstack([b - mean, np.reshape(arrows, (-1, b.shape[1]))])
@@ -195,7 +195,7 @@ class Shifting(System):
 
     @cached_property
     def paths(self) -> tuple[Reach, ...]:
-        """Where each leg lets its own body's origin be."""
+        """Loci of the origin of its own body for each leg."""
         return tuple(shift_reach(curve, -tip) for curve, tip in zip(self.curves, self.tips, strict=True))
 
     def pose(self, q: Array) -> Array:

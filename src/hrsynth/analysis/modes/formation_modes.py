@@ -34,8 +34,8 @@ Bodies = dict[str, Array]
 
 @dataclass(frozen=True, eq=False)
 class FormedMode:
-    """A configuration with the measurements of the goal, the poses (4, 4) of its bodies moved by a trivial motion to
-    where they are nearest to the goal's, what is left of the measurements, and what is seen as the opposite value."""
+    """Configuration with the measured values of the goal, the poses (4, 4) of its links moved by a trivial motion to
+    where they are nearest to the goal's, the residual, and the observations with the opposite value."""
 
     configuration: ClosedConfiguration
     bodies: Bodies
@@ -45,7 +45,7 @@ class FormedMode:
 
 @dataclass(frozen=True, eq=False)
 class FormedModes:
-    """The modes, the goal first, and what is known of them, named as of :class:`.solve.SystemModes`."""
+    """Modes, the goal first, and their proof, named as of :class:`.solve.SystemModes`."""
 
     formation: Formation
     modes: tuple[FormedMode, ...]
@@ -68,7 +68,7 @@ def formation_modes(setup: ObservedRobot) -> FormedModes:
         generic = setup.samples.members[0]
         usual = formation_at(generic.configuration, observation_model, generic.relation, setup.decomposition).count
         if formation.count == usual or (sliding is not None and not sliding.spheres):
-            words = f"no measured value shows {flexes}: a continuum of dimension {formation.count}"
+            words = f"no measured value shows {flexes}: a continuous family of dimension {formation.count}"
             return FormedModes(formation, (), words, degenerate=words, continuum=formation.count)
         return FormedModes(
             formation,
@@ -78,14 +78,15 @@ def formation_modes(setup: ObservedRobot) -> FormedModes:
         )
     if formation.group is None:
         return FormedModes(
-            formation, (goal,), "others are not searched for: a trivial motion ties a turn or a scale to another"
+            formation, (goal,), "others are not searched for: a trivial motion couples a rotation or a scale to another"
         )
     listed = None if sliding is None else sliding.modes(formation, goal)
     return listed or _search(observation_model, formation, formation.group, goal)
 
 
 def _slides(at: ClosedConfiguration) -> bool:
-    """Whether all joints are slides that nothing closes: no body turns, and points are linear in the coordinates."""
+    """Return True if all joints are prismatic and in no loop: no link rotates, and points are linear in the
+    coordinates."""
     mechanism = at.model.mechanism
     return (
         at.model.nv == len(mechanism.joints)
@@ -95,7 +96,7 @@ def _slides(at: ClosedConfiguration) -> bool:
 
 
 class _Sliding:
-    """A formation whose bodies only slide, about its goal: what is measured are planes, linear in the slides, and
+    """A formation whose bodies only slide, about its goal: the measured values are planes, linear in the slides, and
     ``spheres``, vectors (3,) of constant length with their slopes (3, slides), metres."""
 
     def __init__(self, setup: ObservedRobot) -> None:
@@ -107,7 +108,7 @@ class _Sliding:
         planes, nearest = list[Array](), np.inf
         self.spheres: list[tuple[Array, Array]] = []
         self.known = len(seen) == len(self.question.observations)
-        """Whether what each value leaves is known."""
+        """True if the locus of each value is known."""
         for each, place in seen:
             assert isinstance(each, CameraObservation | SeenAxis)
             ends = [(each.link, 1.0), (each.seen_from or self.question.reference, -1.0)]
@@ -125,7 +126,7 @@ class _Sliding:
                     nearest = min(nearest, float(np.linalg.norm((place.foot if along else place.B) - place.C)))
         self.rows = np.array(planes).reshape(-1, model.nv)
         self.slack = NUMBER_ROUNDING + MOVED * known / nearest
-        """How far their entries can be from the exact ones."""
+        """Error of their entries."""
 
     def modes(self, formation: Formation, goal: FormedMode) -> FormedModes | None:
         """All modes of a rigid formation; None where the planes leave more than similarities, one of them perhaps cut
@@ -146,7 +147,7 @@ class _Sliding:
                 (goal,),
                 proof
                 + "only trivial motions are left"
-                + ("; a negative scale would reverse what is measured" if group.scaled else ""),
+                + ("; a negative scale would reverse the measured values" if group.scaled else ""),
                 True,
                 1,
                 "rank",
@@ -158,7 +159,7 @@ class _Sliding:
             else FormedModes(
                 formation,
                 (goal, *others),
-                proof + "besides trivial motions a line is left, which the distances cut",
+                proof + "besides trivial motions a line is left, on which the distances decide",
                 True,
                 1 + len(others),
                 "rank",
@@ -166,8 +167,8 @@ class _Sliding:
         )
 
     def _on_spheres(self, kernel: Array, goal: FormedMode, group: Similarities) -> list[FormedMode] | None:
-        """What the spheres leave of the line of the ``kernel`` that is no trivial motion: σ with (σ w + 2 v) · w = 0;
-        None where several nearly agree."""
+        """Return the nontrivial solution of the spheres on the line of the ``kernel``: σ with (σ w + 2 v) · w = 0; None
+        if several nearly agree."""
         changed = np.vstack([slopes @ kernel for _, slopes in self.spheres])
         line = kernel @ np.linalg.svd(changed)[2][0]
         cuts = [
@@ -187,8 +188,8 @@ class _Sliding:
 
 
 def _has_rank(rows: Array, slack: float, rank: int) -> bool:
-    """Whether all matrices whose entries are within ``slack`` of these have this rank at least: a minor that has an
-    inverse in interval arithmetic."""
+    """Return True if all matrices whose entries are within ``slack`` of these have this rank at least: a minor that has
+    an inverse in interval arithmetic."""
     from flint import arb, arb_mat
     from scipy.linalg import qr
 
@@ -247,7 +248,7 @@ def _search(
                 tolerance=SOLVED,
                 iterations=SEARCH_ITERATIONS,
             )
-        except UndefinedValue:  # on the way a point came to a camera's centre
+        except UndefinedValue:  # along the path a point came to a camera's centre
             continue
         if residual > CLOSED:
             continue
@@ -272,13 +273,13 @@ def _search(
         else:
             met[known] += 1
     rare = sum(count == 1 for count in met[1:])
-    proof = f"found from {starts} random starts of all bodies, of which {closed} closed"
-    proof += f"; {rare} of the modes met only once" if rare else ""
+    proof = f"found from {starts} random starts of all links, of which {closed} closed"
+    proof += f"; {rare} of the modes found only once" if rare else ""
     return FormedModes(
         formation,
         tuple(modes),
         proof,
         degenerate=None
         if not loose
-        else (f"{loose} starts ended at configurations, not listed, at which more motions are not seen"),
+        else (f"{loose} starts ended at configurations, not listed, at which further motions are unobserved"),
     )

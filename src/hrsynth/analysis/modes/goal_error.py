@@ -1,4 +1,4 @@
-"""How far a closed configuration can be from the exact one."""
+"""Distance of a closed configuration from the exact one."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ LEVER = 2.0
 
 
 def drift(goal: ClosedConfiguration, pose: Task | None = None, moved: float = 0.0) -> float:
-    """How far a point of a link can be from where it is at the exact goal (m), within the robot's extent; infinite
-    where that is not proved. ``moved``: how far axes and centres are from those of the file (m), all together.
+    """Return how far a point of a link can be from its position at the exact goal (m), within the robot's extent;
+    infinite where that is not proved. ``moved``: how far axes and centres are from those of the file (m), all together.
 
     Newton and Kantorovich: with σ the smallest singular value of the rows J that count and L a Lipschitz constant of J,
     L ‖F‖ ≤ σ²/2 gives an exact goal within 2 ‖J⁺ F‖. Rows that depend on the others are taken as consistent.
@@ -43,7 +43,7 @@ def drift(goal: ClosedConfiguration, pose: Task | None = None, moved: float = 0.
 
 
 def _lever(goal: ClosedConfiguration, link: str) -> float:
-    """How far a link's joint centres are from its origin (characteristic lengths)."""
+    """Return how far a link's joint centres are from its origin (characteristic lengths)."""
     mechanism = goal.model.mechanism
     origin = mechanism.links[link].pose[:3, 3]
     return max(

@@ -34,12 +34,10 @@ POLISHES, ROUNDS = 4, 40
 
 @dataclass(frozen=True, eq=False)
 class PathEndpoints:
-    """Where the paths end: at ``solutions`` (m, 7), singular ones ``multiple`` times, real or with their conjugates;
-    ``infinite``: how many end at no solution, ``lost``: how many were given up.
-
-    ``loose``: singular ends, each met by one path: a continuum of solutions ends paths anywhere. ``far``: the (e, g)
-    (m, 8) at which paths that end at no solution were left.
-    """
+    """Endpoints of the paths: at ``solutions`` (m, 7), singular ones ``multiple`` times, real or with their conjugates;
+    ``infinite``: how many end at no solution, ``lost``: how many were given up. ``loose``: singular endpoints, each
+    reached by one path: a continuous family of solutions ends paths anywhere. ``far``: the (e, g) (m, 8) at which paths
+    that end at no solution were left."""
 
     solutions: Array
     multiple: tuple[int, ...]
@@ -59,7 +57,7 @@ def section() -> Array:
 
 @lru_cache(maxsize=1)
 def _start() -> tuple[Array, Array]:
-    """The section and its solutions (40, 8), unit vectors, found once by monodromy."""
+    """Section and its solutions (40, 8), unit vectors, computed once by monodromy."""
     x = np.load(Path(__file__).with_name("section.npy")).astype(complex)
     return section(), _newton(section(), x, 2)[0]
 
@@ -163,7 +161,7 @@ class _Sorted:
 
 
 def _sort_ends(wanted: Array, x: Array, known: Sequence[Array]) -> _Sorted:
-    """What the ends (m, 8) of paths are, with solutions that are ``known`` already."""
+    """Classify the endpoints (m, 8) of paths, with solutions that are ``known`` already."""
     left, (x, steps) = x, _newton(wanted, x, POLISHES)
     infinite = _distance(x) > FARTHEST
     sharp = ~infinite & (steps < POLISHED)
@@ -200,12 +198,12 @@ def _turn_real(x: Array, flat: float = SAME_END) -> Array:
 
 
 def _apart(one: Array, other: Array) -> float:
-    """How far two unit vectors are apart, up to factors."""
+    """Return the difference of two unit vectors, up to factors."""
     return float(np.linalg.norm(one - other * np.vdot(other, one)))
 
 
 def _distance(x: Array) -> Array:
-    """How far the poses (n, 8) are away (sizes), at least."""
+    """Return how far the poses (n, 8) are away (sizes), at least."""
     e, g = x[:, :4], x[:, 4:]
     return 2.0 * np.linalg.norm(g, axis=1) * np.linalg.norm(e, axis=1) / (np.abs((e * e).sum(axis=1)) + 1e-300)
 
@@ -240,7 +238,7 @@ def _step(J: Array, x: Array, F: Array) -> Array:
     right = np.concatenate([-F, np.zeros((len(x), 1))], axis=1)[:, :, None]
     try:
         return np.asarray(np.linalg.solve(_border(J, x), right)[:, :, 0])
-    except np.linalg.LinAlgError:  # NumPy does not say of which
+    except np.linalg.LinAlgError:  # NumPy does not report which one
         if len(x) == 1:
             return np.full(x.shape, np.inf, dtype=complex)
         return np.concatenate([_step(J[k : k + 1], x[k : k + 1], F[k : k + 1]) for k in range(len(x))])

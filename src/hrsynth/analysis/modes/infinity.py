@@ -75,8 +75,9 @@ class FixedForm(NamedTuple):
 
 
 def beyond(part: PoseSystem, balls: Within, far: Array, wanted: int) -> int:
-    """How many solutions at infinity, or beyond ``FARTHEST`` for all input in the balls, are enclosed and apart: near
-    the ends ``far`` (m, 8) of paths, as (e, g). Other coordinates are tried until as many as ``wanted`` are."""
+    """Count the solutions at infinity, or beyond ``FARTHEST`` for all input in the balls, that are enclosed and
+    distinct: near the ends ``far`` (m, 8) of paths, as (e, g). Other coordinates are tried until as many as ``wanted``
+    are."""
     most = 0
     for number in range(1, MARKS + 1):
         most = max(most, _enclose_infinity(part, balls, far, np.exp(1j * number * np.arange(1, 5) ** 2)))
@@ -143,5 +144,5 @@ def _polish(equations: Sequence[Polynomial], z: Array) -> Array:
 
 
 def _clear(one: Sequence[Any], other: Sequence[Any]) -> bool:
-    """Whether two boxes are apart."""
+    """Return True if two boxes are disjoint."""
     return any(not (a - b).contains(0) for a, b in zip(one, other, strict=True))

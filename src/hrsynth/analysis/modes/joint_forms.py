@@ -1,5 +1,5 @@
-"""All closings of a platform that a leg carries: how many at most, by ranks modulo a prime, and all of them proposed by
-linear algebra (docs/pages/proofs.md, section 8).
+"""Closed configurations of a platform that a leg carries: root bound by ranks modulo a prime, and all of them proposed
+by linear algebra (docs/pages/proofs.md, section 8).
 
 A turn is that of the quaternion y + z a with (y : z) in a projective line, but for w = y² + z² a·a = 0; a slide is
 z / y, w = y. Conditions on the joints are forms of a degree in each line. With W the product of all w, I_t the
@@ -95,7 +95,7 @@ def eigenvalues(system: CarriedPlatform, chosen: Sequence[CarriedCondition], cou
 
 
 def _coefficients(system: CarriedPlatform, told: CarriedCondition, own: Sequence[int]) -> Array:
-    """Of exp(i m q), |m| up to half the degree, and of powers of slides; one axis a joint."""
+    """Return the value at exp(i m q), |m| up to half the degree, and at powers of slides; one axis a joint."""
     nodes = [
         np.cos(np.pi * (np.arange(d + 1) + 0.5) / (d + 1)) if f.slides else 2 * np.pi * np.arange(d + 1) / (d + 1)
         for f, d in zip(system.freedoms_, own, strict=True)
@@ -169,7 +169,7 @@ def _move(freedom: Turn, a: Any, y: Any, z: Any, w: Any) -> tuple[Any, Any]:
 
 
 def _value(system: CarriedPlatform, told: CarriedCondition, moves: Sequence[tuple[Any, Any]]) -> Any:
-    """Of a condition (n,), joints that change nothing of it left out."""
+    """Return the values of a condition (n,), without joints that leave it unchanged."""
     count = len(moves[0][0])
     x, d = (np.broadcast_to(residues(v), (count, 3)) for v in (told.condition.b, told.condition.c))
     for k in range(told.joints - 1, -1, -1):

@@ -47,7 +47,7 @@ _Reading = Callable[..., _Read]
 
 @dataclass(frozen=True, eq=False)
 class OriginAndUnit:
-    """Where lengths are counted from (m), and in which unit (m)."""
+    """Origin (m) and unit (m) of lengths."""
 
     origin: Array
     size: float
@@ -63,7 +63,7 @@ def rigid_platform(measured: MeasuredRobot, goal: ClosedConfiguration) -> tuple[
     bodies = leg_ends(decomposition)
     if len(bodies) != 1 or decomposition.point is not None or decomposition.mechanism.couplings:
         raise UnsupportedLocus(
-            measured.setup.robot.name, "its platform is not one rigid body whose pose the legs decide"
+            measured.setup.robot.name, "its platform is not one rigid body whose pose the legs determine"
         )
     return bodies[0], OriginAndUnit(goal.pose(bodies[0])[:3, 3], goal.model.length)
 
@@ -77,9 +77,9 @@ def leg_conditions(
     plane: Array | None = None,
     kept: bool = False,
 ) -> tuple[Branches, float]:
-    """All branches of what a leg, with its measurements held, asks of the platform, the goal's own first; and how far
-    its geometry was moved (m). ``plane``: the normal of a motion in a plane; ``kept``: whether the platform does not
-    turn. Raises ``UnsupportedLocus``."""
+    """Return all leg solutions of the conditions of a locked leg on the platform, the goal's own first; and how far its
+    geometry was moved (m). ``plane``: the normal of a motion in a plane; ``kept``: True if the platform does not
+    rotate. Raises ``UnsupportedLocus``."""
     own = [o for o in observation_model.observations if o.leg == leg.label]
     twists = leg_twists(goal, leg, own, observation_model.reference)
     count = (6 if plane is None else 3) - twists.shape[1]
@@ -113,7 +113,7 @@ def leg_conditions(
             reasons.append(str(error))
     raise UnsupportedLocus(
         decomposition.mechanism.name,
-        f"what leg {leg.label} requires of the platform is not known: {'; '.join(dict.fromkeys(reasons))}",
+        f"the conditions of leg {leg.label} on the platform are not known: {'; '.join(dict.fromkeys(reasons))}",
     )
 
 
@@ -134,8 +134,8 @@ def _tips(decomposition: LegDecomposition, path: Sequence[WordEdge], goal: Close
 
 @dataclass(frozen=True, eq=False)
 class _Rods:
-    """Equal rods at the end of a leg: the ``tip`` of the one that is watched, the vector ``along`` it, and those
-    ``across`` to the others, where they start and where they end (m)."""
+    """Equal rods at the end of a leg: the ``tip`` of the observed one, the vector ``along`` it, and those ``across`` to
+    the others, where they start and where they end (m)."""
 
     tip: Array
     along: Array
@@ -145,7 +145,7 @@ class _Rods:
     def of(
         cls, decomposition: LegDecomposition, edge: WordEdge, own: Sequence[Observation], goal: ClosedConfiguration
     ) -> _Rods | None:
-        """Those of the last part of a leg, where it is such rods."""
+        """Return the rods of the last part of a leg, if it is of such rods."""
         if not isinstance(edge.word.items[0], Rods) or len(edge.joints) < 4:
             return None
         watched = {each.link for each in own if isinstance(each, Direction)}
@@ -168,11 +168,11 @@ class _Rods:
         carrier = len(found.bodies) - 3
         Q, axis = known[carrier], found.bodies[carrier].axis
         if Q is None and (axis is None or known[carrier - 1] is None):
-            raise LocusNotDerived("what carries its rods turns")
+            raise LocusNotDerived("the link that carries its rods rotates")
         if (Q is not None and np.abs(Q - np.eye(3)).max() > SAME_RELATION) or any(
             Q is None and axis is not None and not lines.parallel(e / np.linalg.norm(e), axis) for e, _ in self.across
         ):
-            raise LocusNotDerived("what carries its rods turns them")
+            raise LocusNotDerived("the link that carries its rods rotates them")
         if any(abs(float(e @ e - f @ f)) > SAME_RELATION * found.length**2 for e, f in self.across):
             raise LocusNotDerived("its rods are not those of a parallelogram")
         return [
@@ -206,7 +206,7 @@ def _of_tip(
             d, c = one_axis(found, known)
             turns = [*((a, c, 0.0) for a in plane_axes(d)), (d, c, 1.0)]
         elif missing:
-            raise LocusNotDerived(f"{missing} conditions on how the platform turns")
+            raise LocusNotDerived(f"{missing} conditions on the platform's rotation")
         if not any(_alike(reach, other, found.length) and _same_turns(turns, others) for other, others in seen):
             seen.append((reach, turns))
     b = middle.point(tip)
@@ -282,7 +282,7 @@ def _across(d: Array) -> list[Array]:
 def _in_motion(
     leg: str, reach: Reach | Quadrics, b: Array, o: Array, n: Array, middle: OriginAndUnit
 ) -> list[PoseCondition]:
-    """The same in a plane with the normal n, whatever the heights above it."""
+    """Return the conditions in a plane with the normal n, at any height."""
     none = np.zeros(3)
     if isinstance(reach, Point):
         return [OnPlane(leg, b, none, v, float(v @ o)) for v in _across(n)]
@@ -299,7 +299,8 @@ def _profile(reach: Revolution, middle: OriginAndUnit) -> Array:
 
 
 def _of_foot(leg: str, found: Chain, count: int, tip: Array, middle: OriginAndUnit, plane: Array | None) -> _Read:
-    """A point of the base that is confined in the platform's frame, by what follows the last body at rest."""
+    """Return the conditions of a point of the base that is confined in the platform's frame, by the part after the last
+    fixed link."""
     seen: list[tuple[Reach | Quadrics, Array]] = []
     moved = 0.0
     for known, _ in orientations(found):
@@ -308,7 +309,7 @@ def _of_foot(leg: str, found: Chain, count: int, tip: Array, middle: OriginAndUn
             reach, radii = place(rest, own)
             moved = max(moved, radii)
             if (3 if plane is None else 2) - reach.freedoms != count:
-                raise LocusNotDerived("its foot and how it turns the platform")
+                raise LocusNotDerived("its proximal centre and its rotation of the platform")
             if not any(
                 _alike(reach, other, found.length) and np.linalg.norm(foot - at) <= SAME_RELATION * found.length
                 for other, at in seen
@@ -335,12 +336,12 @@ def _holds(
             leg, b, none, o, np.array([0.0, 0.0, 1.0]), np.array([(reach.radius / middle.size) ** 2, 0.0, -1.0])
         )
         return [*([OnMovingPlane(leg, b, reach.axis, o, 0.0)] if isinstance(reach, Circle) else []), ball]
-    raise LocusNotDerived(f"a {type(reach).__name__.lower()} of the platform that holds its foot")
+    raise LocusNotDerived(f"a {type(reach).__name__.lower()} of the platform that contains its proximal centre")
 
 
 def chain_from_platform(found: Chain, known: Known) -> tuple[Array, Chain]:
-    """The foot (m), the place of what follows the last body of known orientation, and the chain from the platform to
-    it. Raises :class:`LocusNotDerived` where it holds a measurement."""
+    """Return the proximal centre (m), the place of the part after the last link of known orientation, and the chain
+    from the platform to it. Raises :class:`LocusNotDerived` if it contains an observation."""
     last = max(k for k, Q in enumerate(known) if Q is not None)
     bodies = found.bodies[last:]
     if (
@@ -348,12 +349,12 @@ def chain_from_platform(found: Chain, known: Known) -> tuple[Array, Chain]:
         or len(bodies) < 2
         or any(body.slides or body.cranks for body in found.bodies[: last + 1])
     ):
-        raise LocusNotDerived("what is measured or carried does not let it be read from the platform")
+        raise LocusNotDerived("an observation or a carried link keeps it from being read from the platform")
     foot = found.bodies[0].point + sum(
         (Q @ body.shift for Q, body in zip(known[: last + 1], found.bodies, strict=False) if Q is not None), np.zeros(3)
     )
     if any(Q is None for Q in known[:last]):
-        raise LocusNotDerived("a body that turns before its foot")
+        raise LocusNotDerived("a link that rotates before its proximal centre")
     end = bodies[-1]
     new = [ChainBody(None, end.point + end.shift, -end.shift, end.slides)]
     for before, after in zip(bodies[-2::-1], bodies[:0:-1], strict=True):
@@ -363,8 +364,8 @@ def chain_from_platform(found: Chain, known: Known) -> tuple[Array, Chain]:
 
 
 def _in_plane(leg: str, found: Chain, count: int, tip: Array, middle: OriginAndUnit, plane: Array | None) -> _Read:
-    """An axis t through the foot, axes n normal to it between which all lies in a plane, and an axis c through the tip
-    normal to those: t, foot to tip and c lie in one plane."""
+    """An axis t through the proximal centre, axes n normal to it between which all is in a plane, and an axis c through
+    the tip normal to those: t, the line to the tip and c are in one plane."""
     bodies = found.bodies
     if (
         count != 1

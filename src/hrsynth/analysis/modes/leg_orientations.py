@@ -1,4 +1,4 @@
-"""Which orientations the held values leave to the bodies of a chain: all of them, branch by branch.
+"""Orientations of the bodies of a locked chain: all of them, one leg solution after the other.
 
 Two cones with one apex meet in two lines, so a direction that is held behind two axes has two solutions; so have three
 axes between two bodies that do not turn. Only necessary conditions are used: what is not found here is left open, never
@@ -52,8 +52,8 @@ def _settle(chain: Chain, known: Known, gain: float) -> list[tuple[Known, float]
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """Bodies that are known now, and for each solution what orientations they have, with its gain; no solution: there
-    is no such branch."""
+    """Bodies that are known now, and for each solution their orientations, with its gain; without a solution there is
+    no such branch."""
 
     places: tuple[int, ...]
     turns: tuple[tuple[tuple[Array, ...], float], ...]
@@ -112,7 +112,7 @@ def kept_angle(chain: Chain) -> tuple[Array, Array]:
     found = [two_axes(chain, known) for known, _ in orientations(chain)]
     first = found[0]
     if any(not _same(a, first[0]) for a, *_ in found):
-        raise LocusNotDerived("the axis with which its end keeps an angle differs between branches")
+        raise LocusNotDerived("the axis with which its end keeps an angle differs between leg solutions")
     return first[:2]
 
 
@@ -142,7 +142,7 @@ def _turning(chain: Chain, known: Known) -> tuple[Array, list[Way]]:
             base = Q
             break
         if body.axis is None and not body.watched:
-            raise LocusNotDerived("its end turns freely")
+            raise LocusNotDerived("its end rotates freely")
         axes.append(body.watched[0] if body.axis is None else body.axis)
         if body.axis is None:
             break
@@ -248,7 +248,7 @@ def _cones(a: Array, b: Array, start: Array, end: Array) -> list[tuple[Array, Ar
     if any(lines.parallel(z, axis) for z in ends for axis in (a, b)):
         return None
     if EXACT < s <= SAME_RELATION:
-        raise LocusNotDerived("it is where two of its branches nearly meet")
+        raise LocusNotDerived("two of its solutions nearly coincide")
     for z in sorted(ends[: 1 + (s > EXACT)], key=lambda z: float(np.linalg.norm(z - start))):
         second, first = _about(b, start, z), _about(a, z, end)
         if first is not None and second is not None:

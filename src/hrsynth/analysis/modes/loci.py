@@ -1,4 +1,4 @@
-"""What the tip of an observed leg can reach while its direction is held: a point, a curve or a surface.
+"""Loci of the tip of an observed leg with a fixed direction: point, curve or surface.
 
 Lengths in metres, angles in radians, all coordinates in one frame that the caller chooses (the base frame).
 """
@@ -33,7 +33,7 @@ class _Checked(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Point(_Checked):
-    """The tip rests at ``centre``, shape (3,)."""
+    """The tip is fixed at ``centre``, shape (3,)."""
 
     centre: Array
     freedoms = 0
@@ -43,7 +43,7 @@ class Point(_Checked):
         return self.centre
 
     def miss(self, tip: Array) -> Array:
-        """What separates ``tip`` from the curve; shape (3,), metres."""
+        """Return the difference of ``tip`` and the curve; shape (3,), metres."""
         return tip - self.centre
 
 
@@ -162,7 +162,7 @@ class SweptCircle(_Checked):
     freedoms = 2
 
     def off(self, centre: Array) -> Array:
-        """How far the centre is from that of another; on a cylinder that slides."""
+        """Return the distance of the centre from that of another; on a cylinder that slides."""
         v = self.centre - centre
         return v if self.other else v - self.direction * float(self.axis @ v) / float(self.axis @ self.direction)
 
@@ -170,13 +170,13 @@ class SweptCircle(_Checked):
 Curve = Point | Line | Circle
 Surface = Sphere | Plane
 Reach = Curve | Surface
-"""What a tip can reach."""
+"""Locus of a tip."""
 Quadrics = Revolution | SweptCircle
 """Surfaces that only conditions on the pose know."""
 
 
 def curves_of(reaches: Iterable[Reach]) -> list[int]:
-    """The places of those that have one freedom or none."""
+    """Indices of those that have one dof or none."""
     return [k for k, reach in enumerate(reaches) if not isinstance(reach, Surface)]
 
 
@@ -185,7 +185,7 @@ def shift_reach(reach: Curve, by: ArrayLike) -> Curve: ...
 @overload
 def shift_reach(reach: Reach, by: ArrayLike) -> Reach: ...
 def shift_reach(reach: Reach, by: ArrayLike) -> Reach:
-    """The same moved by ``by`` (3,), with the same parameter at each point of a curve."""
+    """Return the locus moved by ``by`` (3,), with the same parameter at each point of a curve."""
     return replace(reach, centre=reach.centre + np.asarray(by, dtype=float))
 
 
@@ -210,14 +210,14 @@ def extent(curves: Sequence[Reach], tips: Array) -> float:
 def _vector(values: ArrayLike) -> Array:
     array = frozen(values)
     if array.shape != (3,) or not np.isfinite(array).all():
-        raise BadRequest("a curve's vector", np.asarray(values).tolist(), "three finite numbers")
+        raise BadRequest("vector of a locus", np.asarray(values).tolist(), "three finite numbers")
     return array
 
 
 def _radius(what: str, value: float) -> float:
     radius = float(value)
     if not (radius > 0 and np.isfinite(radius)):
-        raise BadRequest(f"a {what} without a radius", radius, "a positive length in metres")
+        raise BadRequest(f"radius of a {what}", radius, "a positive length in metres")
     return radius
 
 
@@ -225,5 +225,5 @@ def _unit(values: ArrayLike) -> Array:
     array = _vector(values)
     size = length(array)
     if not size > 0:
-        raise BadRequest("a curve's direction", array.tolist(), "a vector that is not zero")
+        raise BadRequest("direction of a locus", array.tolist(), "a nonzero vector")
     return array if abs(size - 1.0) < 1e-15 else frozen(array / size)

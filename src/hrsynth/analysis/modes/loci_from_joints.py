@@ -1,4 +1,4 @@
-"""All that the tip of a held leg can reach, from the leg's own joints: p₁ + Σ Q_i w_i, one reach a branch.
+"""Locus of the tip of a locked leg, from the leg's own joints: p₁ + Σ Q_i w_i, one reach a branch.
 
 What each body adds is a fixed vector, a circle (it turns about a fixed direction), a sphere (it turns freely) or a line
 (it slides). The sum holds all places of the tip; where its dimension is that which the leg's screws give, it is the
@@ -38,7 +38,7 @@ def reaches(chain: Chain) -> tuple[list[tuple[Reach, float]], float]:
         if gap > SAME_POINT:
             found.append((reach, gain * chain.extent / chain.length if found else 1.0))
         elif gap > SAME_POINT / RANK_GAP:
-            raise LocusNotDerived(f"two of its branches lie only {gap:.1e} characteristic lengths apart")
+            raise LocusNotDerived(f"two of its solutions differ by only {gap:.1e} characteristic lengths")
         else:
             moved = max(moved, gap * chain.length)
     moved = moved if moved > CHAIN_ROUNDING * chain.extent else 0.0
@@ -55,7 +55,7 @@ class _Sum:
     lines: list[Array] = field(default_factory=list)
     spheres: list[float] = field(default_factory=list)
     sweeps: list[tuple[Array, Array, Array]] = field(default_factory=list)
-    """Slides oblique to the axes about which they turn: axis, what turns besides, slide."""
+    """Slides oblique to the axes about which they rotate: axis, other rotating parts, slide."""
     moved: float = 0.0
     """Radii of circles and spheres that count as points, all together (m)."""
     tilt: float = 0.0
@@ -85,10 +85,10 @@ class _Sum:
         """Its name. Raises :class:`LocusNotDerived` where it has none."""
         if self.sweeps:
             if len(self.sweeps) > 1 or self.spheres or self.circles or self.lines:
-                raise LocusNotDerived("a slide that turns about an axis oblique to it, and another part that moves")
+                raise LocusNotDerived("a P that rotates about an axis oblique to it, and another part that moves")
             return Revolution.swept(self.centre, *self.sweeps[0])
         if self.spheres and (len(self.spheres) > 1 or self.circles or self.lines):
-            raise LocusNotDerived("a part that turns freely and another that moves")
+            raise LocusNotDerived("a part that rotates freely and another that moves")
         if self.spheres:
             return Sphere(self.centre, self.spheres[0])
         if not self.circles and not self.lines:
@@ -132,7 +132,7 @@ def place(chain: Chain, known: Known) -> tuple[Reach | Quadrics, float]:
         elif body.watched:
             _spins(total, body)
         elif not body.rigid:
-            raise LocusNotDerived("a body that turns freely and carries a slide or a parallelogram")
+            raise LocusNotDerived("a link that rotates freely and carries a P or a parallelogram")
         else:
             total.ball(body.shift)
     reach = total.reach()
@@ -182,10 +182,10 @@ def _turns(total: _Sum, body: ChainBody, Q: Array, a: Array) -> None:
             total.lines += [first, np.cross(axis, first)]
             total.tilt += abs(float(slide @ a))
         else:
-            raise LocusNotDerived("a slide that turns about an axis oblique to it")
+            raise LocusNotDerived("a P that rotates about an axis oblique to it")
     for crank in body.cranks:
         if crank.held or not lines.parallel(crank.axis, a):
-            raise LocusNotDerived("a parallelogram that turns about another axis than its own")
+            raise LocusNotDerived("a parallelogram that rotates about another axis than its own")
         _crank(total, Q, axis, crank.vector, crank.watched)
 
 
@@ -194,12 +194,12 @@ def _spins(total: _Sum, body: ChainBody) -> None:
     d = body.watched[0]
     total.turn(d, body.shift)
     if body.cranks or any(not lines.parallel(slide, d) for slide in body.slides):
-        raise LocusNotDerived("a body that spins about its watched direction and carries more than a slide along it")
+        raise LocusNotDerived("a link that spins about its observed direction and carries more than a P along it")
     total.lines += [d] * len(body.slides)
 
 
 def apart(one: Reach | Quadrics, other: Reach | Quadrics, length: float) -> float:
-    """How far two reaches are apart (characteristic lengths, radians); infinite where they are of different kinds."""
+    """Return the difference of two loci (characteristic lengths, radians); infinite if they are of different kinds."""
     if type(one) is not type(other):
         return np.inf
     between = (

@@ -29,13 +29,13 @@ from ...tolerances import CHAIN_ROUNDING, RANK_GAP, SAME_DIRECTION, SAME_POINT
 
 
 class LocusNotDerived(Exception):
-    """What a held leg's end can do does not follow from its joints by the known laws; the text says why."""
+    """Locus of a locked leg's end that is not derived from its joints by the known laws; the text is the reason."""
 
 
 @dataclass(frozen=True, eq=False)
 class Crank:
-    """The crank of a parallelogram on a body: its axis, from pivot to pivot, the directions watched in it, and whether
-    a motor holds it."""
+    """Crank of a parallelogram on a link: its axis, from pivot to pivot, the observed directions in it, and whether a
+    motor fixes it."""
 
     axis: Array
     vector: Array
@@ -48,7 +48,7 @@ class ChainBody:
     """A body that turns against the one before about ``axis`` (None: about all, in a ball; the base: not at all).
 
     ``point`` is on that axis; ``shift`` leads from there to the next body's, cranks left out; ``slides`` are directions
-    fixed in it along which it carries what follows; ``watched`` those that are held.
+    fixed in it along which it carries the next part; ``watched`` those that are fixed.
     """
 
     axis: Array | None
@@ -62,7 +62,7 @@ class ChainBody:
 
     @property
     def rigid(self) -> bool:
-        """Whether what follows is fixed in it."""
+        """True if the next part is fixed in it."""
         return not self.slides and not self.cranks
 
 
@@ -86,7 +86,7 @@ class Chain:
 
     @property
     def moved(self) -> float:
-        """How far axes and centres were moved so that they meet, coincide or are parallel, all together (m)."""
+        """Distance that axes and centres were moved so that they meet, coincide or are parallel, all together (m)."""
         return self.off + self.extent * _parallel_angles(self.bodies)
 
 
@@ -138,7 +138,7 @@ class _Walk:
         self.anatomy, self.leg, self.goal = decomposition, leg, goal
         self.watched: dict[str, list[Array]] = {}
         self.coordinates: dict[str, int] = {}
-        """How many coordinates of a joint a motor holds."""
+        """Return the number of coordinates of a joint that a motor fixes."""
         base = decomposition.mechanism.base
         for each in held:
             if isinstance(each, Encoder):
@@ -146,7 +146,7 @@ class _Walk:
             elif isinstance(each, Direction) and (each.seen_from or decomposition.mechanism.reference) == base:
                 self.watched.setdefault(each.link, []).append(goal.pose(each.link)[:3, :3] @ each.direction)
             else:
-                raise LocusNotDerived("what is measured is not a direction seen from the base")
+                raise LocusNotDerived("an observation is not a direction from the base")
 
     def bodies(self, tip: Array) -> tuple[tuple[ChainBody, ...], float]:
         """The bodies, shifts included, and how far their points were moved to meet (m); every measurement must be met
@@ -166,7 +166,7 @@ class _Walk:
             found[-1] = replace(found[-1], watched=found[-1].watched + self._sight(there))
             at = there
         for what in (*self.watched, *self.coordinates):
-            raise LocusNotDerived(f"what is measured at {what} is not on the way from the base to the leg's end")
+            raise LocusNotDerived(f"the observation at {what} is not on the path from the base to the leg's end")
         return _shift_bodies(found, tip, SAME_POINT * self.goal.model.length)
 
     def _sight(self, link: str) -> tuple[Array, ...]:
@@ -182,7 +182,7 @@ class _Walk:
         held = self.coordinates.pop(joint.name, 0)
         if held:
             if held != len(axes) + (joint.type is JointType.CYLINDRICAL):
-                raise LocusNotDerived(f"a motor holds a part of joint {joint.name}")
+                raise LocusNotDerived(f"a motor fixes a part of joint {joint.name}")
             return
         if joint.type is JointType.SPHERICAL:
             found.append(ChainBody(None, point))
@@ -249,9 +249,9 @@ class _Walk:
         found[-1] = replace(found[-1], cranks=(*found[-1].cranks, crank))
 
     def _rods(self, found: list[ChainBody], edge: WordEdge, at: str) -> None:
-        """The rod that is watched, or the first: all have one direction."""
+        """Add the observed one of parallel rods, or the first: all have one direction."""
         if any(name in self.coordinates for name in edge.joints):
-            raise LocusNotDerived("a motor holds a rod")
+            raise LocusNotDerived("a motor fixes a rod")
         number = next((k for k, link in enumerate(edge.inside) if link in self.watched), 0)
         joints = [self.anatomy.mechanism.joints[name] for name in edge.joints[2 * number : 2 * number + 2]]
         near, far = joints if edge.tail == at else joints[::-1]

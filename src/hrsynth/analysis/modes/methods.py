@@ -1,4 +1,4 @@
-"""The ways to list modes: by tips, by conditions on the pose, by loops, by a leg that carries the platform."""
+"""Methods that list modes: by tips, by conditions on the pose, by loops, by a leg that carries the platform."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ from .solve import SystemModes
 def without_couplings(
     measured: MeasuredRobot, goal: ClosedConfiguration
 ) -> tuple[MeasuredRobot, ClosedConfiguration] | None:
-    """The robot without its couplings, at the same place, and with what is measured held: so are joints that couplings
-    tie to motors that are held. It has all modes of the robot, and those at which couplings cannot be closed besides.
-    None where it has no couplings, sees less than all freedoms without them, or what is measured is of joints that are
-    one without them."""
+    """Return the robot without its couplings, at the same configuration, with its measured values fixed: so are joints
+    that couplings join to fixed motors. It has all modes of the robot, and those at which couplings are not closed.
+    None if it has no couplings, if not all dof are observed without them, or if observations are of joints that are one
+    without them."""
     mechanism, setup = goal.model.mechanism, measured.setup
     if not mechanism.couplings:
         return None
@@ -71,7 +71,7 @@ def without_couplings(
 
 def better_ways(made: Model) -> tuple[Any, ...]:
     """Ways that may count complex modes too where a list is that of a part of the conditions on the pose, as the sense
-    of an axis is told besides."""
+    of an axis is known besides."""
     system = made.system
     senses = sum(isinstance(c, AtAngle) and c.h == 1.0 for c in getattr(system, "conditions", ()))
     if not isinstance(system, PosedPlatform) or not senses:
@@ -99,8 +99,8 @@ def solve_tips(
 
 
 def expected_modes(measured: MeasuredRobot, at: ClosedConfiguration) -> int:
-    """How many modes, complex ones too, the degrees of the legs' conditions allow; the largest number where these are
-    not known."""
+    """Return a root bound of the modes, complex ones too, from the degrees of the legs' conditions; the largest number
+    if these are not known."""
     try:
         return most_posed(measured, at)
     except (UnsupportedLocus, SystemNotSolved):
@@ -108,8 +108,8 @@ def expected_modes(measured: MeasuredRobot, at: ClosedConfiguration) -> int:
 
 
 def count_modes(measured: MeasuredRobot, at: ClosedConfiguration) -> SystemModes:
-    """The modes with the measurements at a configuration, without near ones, and not read as poses of the robot's legs:
-    as :func:`modes`, for many configurations of one robot that sees all its freedoms."""
+    """List the modes with the measured values at a configuration, without near ones, and not read as poses of the
+    robot's legs: as :func:`modes`, for many configurations of one robot that observes all its dof."""
     found = None
     if measured.generic_pattern.motion != "oriented":
         with suppress(UnsupportedLocus, SystemNotSolved, TooLarge, MissingExtra):

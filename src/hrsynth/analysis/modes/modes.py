@@ -1,4 +1,4 @@
-"""All assembly modes of a hidden robot, or of the real one: every pose of the platform with the same measurements."""
+"""Assembly modes of a hidden robot, or of the real one: every pose of the platform with the same measured values."""
 
 from __future__ import annotations
 
@@ -49,17 +49,17 @@ from .tips import TipLoci
 
 WITHIN = {
     "formation": "configurations up to trivial motions",
-    "translations": "poses turned as this one",
-    "bodies": "poses whose bodies are turned as at this one",
+    "translations": "poses with the rotation of this one",
+    "bodies": "poses whose links have the rotations of this one",
     "planar": "poses in the plane of motion",
     "spatial": "poses in space",
     "oriented": "poses in space",
 }
-"""Among which poses the modes are listed, for each way in which the platform moves."""
+"""Poses among which the modes are listed, for each kind of the platform's motion."""
 
 
 class BodyPlace(NamedTuple):
-    """Where a body of a formation is."""
+    """Pose of a link of a formation."""
 
     link: str
     pose: Pose
@@ -73,19 +73,19 @@ class ListedMode(NamedTuple):
         list[BodyPlace] | None,
         list[BodyPlace],
         OPTIONAL,
-        "of a formation: all bodies, moved by a trivial motion to where they are nearest to the file's",
+        "of a formation: all links, moved by a trivial motion to where they are nearest to the file's",
     ]
 
 
 class FollowedMotion(NamedTuple):
-    """A motion that leaves the measurements unchanged, as far as it was followed from a pose."""
+    """Self-motion: measured values are constant along it, as far as it was followed from a pose."""
 
     pose: Pose
     motion: Annotated[SelfMotion, FLAT]
 
 
 class MeantLegs(NamedTuple):
-    """Legs whose joint centres are taken to coincide."""
+    """Legs whose joint centres are snapped to one point."""
 
     where: str
     legs: list[str]
@@ -94,11 +94,26 @@ class MeantLegs(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AssemblyModes(Result, shown_as="modes"):
-    """All assembly modes with the measurements of one pose, the goal.
+    """Assembly modes with the measured values of one pose, the goal.
 
-    ``complex``, ``complete``, ``proof``, ``degenerate`` and ``continuum`` are as for :class:`SystemModes`; ``kind`` is
-    ``hidden`` or ``real``; ``motions`` are continua of modes, with what moves, as far as they were followed, and
-    ``modes`` those that lie on none.
+    Parameters
+    ----------
+    setup
+        Robot with its observations.
+    kind
+        ``hidden``, ``real`` (motors fixed) or ``formation``.
+    goal, pose
+        Configuration and pose at which the values were measured.
+    found
+        Count of complex solutions, completeness and proof, as of :class:`SystemModes`.
+    modes
+        Assembly modes that are not on a self-motion.
+    near_modes
+        Poses within the measurement bound: found, not proved.
+    self_motions
+        Continuous families of modes, as far as they were followed.
+    antipodal
+        Solutions with the opposite value of an observation.
     """
 
     setup: ObservedRobot
@@ -108,26 +123,26 @@ class AssemblyModes(Result, shown_as="modes"):
     found: SystemModes
     modes: tuple[AssemblyMode, ...]
     candidates: tuple[AssemblyMode, ...] = ()
-    """Where near modes are sought: working material, none once they are."""
+    """Starts of the search for near modes; none in a result."""
     near_modes: Annotated[tuple[NearMode, ...], As("near_modes"), "found, not proved to be all"] = ()
-    """Other poses at which what is measured differs by no more than ``bound`` (rad)."""
+    """Other poses whose measured values differ by no more than ``bound`` (rad)."""
     measurement_bound: Annotated[float, As("measurement_bound"), "error (rad) up to which near modes are sought"] = 0.0
     model: Model | None = None
     self_motions: tuple[SelfMotion, ...] = ()
     antipodal: tuple[AssemblyMode, ...] = ()
-    """Solutions of the same equations at which something is seen as the opposite value."""
+    """Solutions of the same equations with the opposite value of an observation."""
     formation: Annotated[Formation | None, Formation, OPTIONAL] = None
-    """Of several bodies: what is not seen of them at the goal."""
+    """Unobserved motions of a formation at the goal."""
 
     @property
     def confined(self) -> TipLoci | None:
-        """The curves of the tips; None if the measurements never decide the pose, or if no such curves are known."""
+        """Loci of the tips; None if the measured values never determine the pose, or if the loci are not known."""
         return None if self.model is None else self.model.confined
 
     @property
     @recorded()
     def within(self) -> str | None:
-        """The poses among which these modes are all."""
+        """Poses among which these modes are all."""
         if self.formation is not None:
             return WITHIN["formation"]
         if self.confined is not None:
@@ -146,11 +161,11 @@ class AssemblyModes(Result, shown_as="modes"):
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """The legs whose ends are confined."""
+        """Legs whose ends are confined."""
         return () if self.confined is None else tuple(tip.leg for tip in self.confined.tips)
 
     def headline(self) -> str:
-        """The robot and how many modes there are."""
+        """Return the robot and the number of modes."""
         if self.formation is not None:
             return f"{self.setup.headline()}: {self.count} (formation)"
         said = (
@@ -162,14 +177,14 @@ class AssemblyModes(Result, shown_as="modes"):
 
     @property
     def alike(self) -> str:
-        """How many poses a measurement with an error does not tell from each other, in words."""
+        """Number of poses that a measurement with an error does not distinguish, as text."""
         return poses_alike(self.modes, self.near_modes)
 
     @property
     def count(self) -> str:
-        """How many there are, in words."""
+        """Number of modes, as text."""
         if self.found.continuous_family is not None and (self.found.complex is not None or self.formation is not None):
-            return "a continuum"
+            return "a continuous family"
         if self.self_motions:
             count = len(self.self_motions)
             return (
@@ -182,7 +197,7 @@ class AssemblyModes(Result, shown_as="modes"):
         )
 
     def pose_of(self, motion: SelfMotion) -> Pose:
-        """A pose on a self-motion, from which it was followed."""
+        """Return a pose on a self-motion, from which it was followed."""
         return self.setup.motion.pose(motion.configuration.pose(self.setup.motion.link))
 
     at = Shown(Pose, lambda self: self.pose)
@@ -198,7 +213,7 @@ class AssemblyModes(Result, shown_as="modes"):
     motions_record = Shown(
         list[FollowedMotion],
         lambda self: [FollowedMotion(self.pose_of(each), each) for each in self.self_motions],
-        As("motions"),
+        As("self_motions"),
     )
     snapped = Shown(
         list[MeantLegs],
@@ -209,7 +224,7 @@ class AssemblyModes(Result, shown_as="modes"):
     limits_ignored = Shown(list[str], lambda self: self.setup.limits_ignored, UNLIMITED)
 
     def _listed(self, modes: Iterable[AssemblyMode]) -> list[ListedMode]:
-        """Modes with where all bodies of a formation are."""
+        """Return modes with the poses of all links of a formation."""
         return [
             ListedMode(
                 mode,
@@ -240,56 +255,82 @@ def modes(
     at: Annotated[
         PoseLike | ClosedConfiguration | None,
         option(
-            "Pose whose measurements are held, such as x=0.02,y=0.1,z=-0.7; or mode:2 of the list "
+            "Pose whose measured values are fixed, such as x=0.02,y=0.1,z=-0.7; or mode:2 of the list "
             "printed without --at (default: the zero configuration).",
             "POSE",
         ),
     ] = None,
-    real: Annotated[bool, option("Hold the real robot's own motors instead.")] = False,
+    real: Annotated[bool, option("Fix the real robot's own motors instead.")] = False,
     cone: Annotated[
         float | str,
-        option("Error of a measurement: poses that differ by no more are near modes; 0 for none.", "ANGLE"),
+        option("Measurement bound: poses that differ by no more are near modes; 0 for none.", "ANGLE"),
     ] = MEASUREMENT_BOUND,
     as_written: bool = False,
     time_limit: Annotated[
         float,
         option(
-            "Time limit for a list (estimated seconds on one core); what needs more is left out, and reported.",
+            "Time limit for a list (estimated seconds on one core); longer lists are left out, and reported.",
             "SECONDS",
             low=0,
         ),
     ] = EFFORT,
     seed: Seed = 0,
 ) -> AssemblyModes:
-    """Assembly modes: poses of the platform with the same measurements, and whether they are proved to be all.
+    """List assembly modes: poses of the platform with the same measured values, and whether they are proved to be all.
 
-    All poses with what is observed at ``at`` (default: the zero configuration), or with ``real`` the motors'
-    coordinates: complex solutions counted, real ones enclosed (proofs.md 8; MMT 3.3, 4.1.2, 4.2).
+    Parameters
+    ----------
+    robot, observe, camera, sensor
+        Robot and observations, as for ``derive``.
+    at
+        Goal: pose at which the values are measured (metres, radians, base frame), or a closed configuration of an
+        observed robot (default: the zero configuration).
+    real
+        True to fix the motors' coordinates instead of the observed values.
+    cone
+        Measurement bound (rad, or as ``"0.1deg"``; 0 for none): poses within it of the goal are listed as near modes.
+    as_written
+        True to take all numbers as they are. By default joint centres that nearly coincide are snapped, and solutions
+        nearly at infinity are taken to be at infinity.
+    time_limit
+        Time limit for a list (seconds on one core), estimated from its size before it starts.
+    seed
+        Seed of the random samples.
 
-    A Π stays a parallelogram, never crossed (except in planar mechanisms that are closed loop by loop, and in
-    searches); if legs or measurements keep the platform from turning, turned poses (another operation mode) are not
-    searched for. Poses that a measurement with an error up to ``cone`` (rad, or as ``"0.1deg"``; 0 for none) does not
-    tell from the goal are listed too, as ``near``: found, not proved. ``observe``, ``camera`` and ``sensor`` are as for
-    ``derive``; ``at`` may be a closed configuration of an observed robot. Joint centres that nearly coincide, and
-    solutions nearly at infinity, are taken to be so if that is clearly meant, unless ``as_written`` is true.
-    ``time_limit`` is the time limit for a list (seconds on one core), estimated from its size before it starts. For a
-    formation: all configurations, trivial motions aside, with what is measured at the zero configuration.
+    Returns
+    -------
+    AssemblyModes
+        Complex solutions counted, real ones enclosed, with the proof. For a formation: all configurations with the
+        values at the zero configuration, up to trivial motions.
 
-    If the tips' paths are of no known kind, or the solver that they need gives up or is not installed, the whole robot
-    is closed from random starts (:mod:`.search`): these modes are found, for any kind of closing, and nothing says that
-    they are all. The same is done if modes lie on a self-motion: the equations then have infinitely many solutions, or
-    rounding makes some of them seem isolated.
+    Raises
+    ------
+    BadRequest
+        If a name or a part of a pose is unknown.
+    PoseNotReached
+        If the pose is out of reach.
+    GeometryAmbiguous
+        If it is not clear whether a geometry is special.
 
-    Raises ``BadRequest`` for unknown names, ``PoseNotReached`` for a pose out of reach, ``GeometryAmbiguous`` if it is
-    not clear whether special geometry is meant.
+    Notes
+    -----
+    The modes are the solutions of the conditions y(x) = y(x₀) on the pose x, y the measured values, x₀ the goal
+    (proofs.md 8; MMT 3.3, 4.1.2, 4.2). A Π stays a parallelogram, never crossed, except in planar mechanisms that are
+    closed loop by loop, and in searches. If legs or values keep the platform from rotating, poses with another rotation
+    (another operation mode) are not sought.
 
-    >>> hrsynth.modes("3rrr_m1", at="x=0,y=0,phi=0")
-    <AssemblyModes: 3rrr_m1, watching 1, 2, 3: 2 real of 6 complex (hidden robot) at x=0,y=0,z=0,phi=0deg>
+    If loci are of an unknown kind, or a solver gives up or is not installed, the whole robot is closed from random
+    starts (:mod:`.search`): these modes are found, and may not be all. The same is done if modes are on a self-motion:
+    the equations then have infinitely many solutions, or rounding makes some of them seem isolated.
+
+    Examples
+    --------
+    >>> hrsynth.modes("3rrr_m1", at="x=0,y=0,phi=0").count
+    '2 real of 6 complex'
     """
     if real and (observe not in (None, "all", ["all"]) or sensor is not None):
-        raise BadRequest(
-            "the motors are held instead of what is observed", f"real with {observe or sensor}", "one of the two"
-        )
+        given = "--observe" if sensor is None else "--sensor"
+        raise BadRequest(f"--real: cannot be combined with {given}", remedy="Omit one.")
     bound = measurement_bound(cone)
     setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed, driven=real)
     if setup.robot.formation:
@@ -320,20 +361,20 @@ def _list_modes(
     as_written: bool,
     time_limit: float,
 ) -> AssemblyModes:
-    """The modes of the numbers as they are, and where near ones are sought."""
+    """List the modes of the numbers as they are, with starts of near ones."""
     motion = setup.motion
     pose = motion.pose(goal.pose(motion.link))
     kind = "real" if real else "hidden"
     free = setup.dof - measured.rank
     if free:
-        text = f"the {'motors' if real else 'measurements'} leave {free} of the platform's freedoms undetermined"
+        text = f"the {'motors' if real else 'measured values'} leave {free} of the platform's dof undetermined"
         own = self_motion(goal, measured.observation_model, placing_links(setup.decomposition), goal=True)
         return AssemblyModes(
             setup,
             kind,
             goal,
             pose,
-            continuum(f"{text}: a continuum of dimension {free}", free),
+            continuum(f"{text}: a continuous family of dimension {free}", free),
             (),
             self_motions=() if own is None else (own,),
         )
@@ -372,12 +413,11 @@ def _list_modes(
 
 
 def _modes_of_formation(setup: ObservedRobot, where: object, real: bool) -> AssemblyModes:
-    """The modes of a formation; refuses poses and motors, which are those of one platform."""
+    """List the modes of a formation; poses and motors are refused, which are those of one platform."""
     if where is not None or real:
         raise BadRequest(
-            f"{setup.robot.name}: poses and motors belong to one platform, and this is a formation",
-            "real" if real else str(where),
-            "nothing: what is measured at the file's configuration is held",
+            "--real: a formation has no motors to fix" if real else f"--at {where}: a formation has no single platform",
+            remedy="Omit the option: the values at the file's configuration are fixed.",
         )
     report("modes")
     found, goal = formation_modes(setup), setup.all_samples.start
@@ -428,19 +468,18 @@ def _modes_of_formation(setup: ObservedRobot, where: object, real: bool) -> Asse
 
 
 def at_mode(listed: AssemblyModes | None, asked: ModeNumber) -> ClosedConfiguration:
-    """The robot assembled at one of its modes, its coordinates counted from the zero configuration; raises
+    """Return the robot assembled at one of its modes, its coordinates relative to the zero configuration; raises
     ``BadRequest``, ``PoseNotReached``."""
     assert listed is not None
     name, count = listed.setup.robot.name, len(listed.modes)
     if not 1 <= asked.number <= count:
         raise BadRequest(
-            f"{name}: a mode at {listed.pose}",
-            str(asked),
-            f"mode:1 to mode:{count}"
+            f"{asked}: {name} has {count} modes at {listed.pose}",
+            remedy=f"Use mode:1 to mode:{count}."
             if count
-            else "no mode"
+            else "Use another pose."
             if listed.found.continuous_family is None
-            else "poses that do not form a continuum",
+            else "Observe more: the modes are a continuous family.",
         )
     mode = listed.modes[asked.number - 1]
     at = listed.goal if mode.goal else mode.configuration
@@ -451,13 +490,13 @@ def at_mode(listed: AssemblyModes | None, asked: ModeNumber) -> ClosedConfigurat
             f"{asked} ({mode.pose})",
             0.0,
             str(listed.pose),
-            reason=f"the robot was not found assembled there: {left} stayed open",
+            reason=f"the robot was not found assembled there: {left} not closed",
         )
     return at if at.model is listed.goal.model else of_links(listed.goal.model, at.pose)
 
 
 def _moves(setup: ObservedRobot, observation_model: ObservationModel, at: ClosedConfiguration) -> bool:
-    """Whether a closing lies on a self-motion that can be followed."""
+    """Return True if a closed configuration is on a self-motion that can be followed."""
     return (
         leaves_free(at, observation_model)
         and self_motion(at, observation_model, placing_links(setup.decomposition)) is not None
@@ -472,7 +511,7 @@ def _modes_by_search(
     kind: str,
     reason: str,
 ) -> AssemblyModes:
-    """The modes that a search finds, and why there is no list that could be complete."""
+    """List the modes that a search finds, with the reason why no list can be complete."""
     done = search(goal, observation_model, placing_links(setup.decomposition))
     size = max((motion.dimension for motion in done.self_motions), default=None)
     found = SystemModes(
@@ -511,8 +550,8 @@ def _modes_by_system(
     as_written: bool,
     time_limit: float,
 ) -> AssemblyModes:
-    """The modes as the solutions of the system that the tips' curves and surfaces give, or else of the conditions that
-    the legs' joints give."""
+    """List the modes as the solutions of the system of the tips' loci, or else of the conditions of the legs'
+    joints."""
     reasons, large = list[UnsupportedLocus | SystemNotSolved | TooLarge | MissingExtra](), None
     answers = list[tuple[Model, SystemModes]]()
     exact, better = drift(goal, wanted, setup.normal.moved), None
@@ -538,12 +577,12 @@ def _modes_by_system(
                 better = () if better else better_ways(answers[-1][0])
     if not answers:
         raise large or reasons[0]
-    # what is measured leaves no freedom: a continuum is that of legs which tips alone do not show
+    # all dof are observed: a continuous family is that of legs which tips alone do not show
     made, found = max(
         answers, key=lambda each: (each[1].complete, each[1].continuous_family is None, not better_ways(each[0]))
     )
     if free is not None and made.closing is None:
-        found = replace(found, proof=f"without couplings, which can only rule poses out: {found.proof}")
+        found = replace(found, proof=f"without couplings, which only exclude poses: {found.proof}")
     reader = ModeReader(setup, measured.observation_model if free is None else free[0].observation_model, goal, made)
     at_goal = min(found.modes, key=reader.away, default=None)
     ordered = sorted(found.modes, key=lambda mode: mode is not at_goal)

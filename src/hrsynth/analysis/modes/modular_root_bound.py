@@ -1,10 +1,10 @@
-"""At most how many zeros quadrics with integer coefficients have: ranks of their multiples modulo a prime
-(docs/pages/proofs.md, section 8).
+"""Root bound of quadrics with integer coefficients: ranks of their multiples modulo a prime (docs/pages/proofs.md,
+section 8).
 
 Linear combinations without a quadratic part give unknowns by others, exactly. B are the monomials whose degree in each
 of some groups of unknowns is below a cap, S those at a cap; rows are all multiples of the quadrics within the caps. If
 the columns S have full rank, each polynomial is one in the span of B modulo the quadrics: at most |B| + |S| - rank
-zeros, multiple ones counted so often, and no continuum. A rank modulo a prime is at most that over ℚ.
+zeros, multiple ones counted so often, and no curve of zeros. A rank modulo a prime is at most that over ℚ.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class Residues:
 
     @classmethod
     def of(cls, forms: Sequence[Mapping[tuple[int, ...], complex]]) -> Residues:
-        """Of polynomials with complex coefficients, which are taken as they are."""
+        """Return the reduction of polynomials with complex coefficients, which are taken as they are."""
         from flint import nmod
 
         def residue(c: complex) -> Any:
@@ -119,7 +119,7 @@ def bezout(forms: Sequence[Form], groups: Sequence[Sequence[int]]) -> int:
 
 
 def combine_quadrics(quadrics: Sequence[Quadric]) -> list[Quadric]:
-    """The same span of quadrics, as many as can be without their quadratic parts."""
+    """Return the same span of quadrics, as many as can be without their quadratic parts."""
     n, found = len(quadrics[0].A) - 1, []
     for form in _reduce_forms([_form(each) for each in quadrics]):
         A, common = np.zeros((n + 1, n + 1), dtype=object), math.lcm(*(c.denominator for c in form.values()))
@@ -146,7 +146,7 @@ def _at(line: Form, k: int) -> Any:
 
 
 def _reduce_forms(forms: Sequence[Form]) -> list[Form]:
-    """The same span, quadratic monomials eliminated first."""
+    """Return the same span, quadratic monomials eliminated first."""
     rows, found = [dict(form) for form in forms], list[Form]()
     columns = sorted({e for form in forms for e in form}, key=lambda e: (-sum(e), [-k for k in e]))
     for e in columns:

@@ -1,4 +1,4 @@
-"""All solutions of quadrics by way of the program msolve.
+"""Solutions of quadrics by way of the program msolve.
 
 msolve gives a rational parametrisation of all solutions of a polynomial system over Q, xᵢ = −vᵢ(t) / (cᵢ w'(t)) at the
 roots t of w, each distinct solution once; by Gröbner bases modulo many primes (J. Berthomieu, C. Eder, M. Safey El Din,
@@ -47,7 +47,7 @@ def parametrise(
     """All solutions of quadrics with integer coefficients; None where they are infinitely many.
 
     With ``nonzero`` those at which that one vanishes are left out, by one more unknown, its inverse.
-    Raises ``MissingExtra`` where msolve is not installed, ``Unsolved`` where it does not answer in time."""
+    Raises ``MissingExtra`` where msolve is not installed, ``SystemNotSolved`` where it does not answer in time."""
     count = len(quadrics[0].A) - 1
     program = executable()
     with tempfile.TemporaryDirectory() as folder:
@@ -74,7 +74,7 @@ def executable() -> Path:
     if found is None or not found.exists():
         elsewhere = shutil.which("msolve")
         if elsewhere is None:
-            raise MissingExtra("listing the poses of tips on surfaces", "solve")
+            raise MissingExtra("the list of poses with tips on surfaces", "solve")
         return Path(elsewhere)
     return found
 
@@ -104,7 +104,7 @@ def _sum(terms: Mapping[str, int]) -> str:
 
 
 def read(text: str, count: int) -> Parametrisation | None:
-    """The answer of msolve for ``count`` unknowns. Raises ``ValueError`` where it is none."""
+    """Parse the answer of msolve for ``count`` unknowns. Raises ``ValueError`` if there is none."""
     from flint import fmpz, fmpz_poly
 
     found = json.loads(re.sub(r"-?\d+", r'"\g<0>"', text.strip().rstrip(":").replace("'", '"')))

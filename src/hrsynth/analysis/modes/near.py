@@ -1,7 +1,8 @@
-"""Near modes: poses that a measurement with an error cannot tell from the goal (docs/pages/proofs.md, section 8).
+"""Near modes: poses that differ from the goal by no more than the measurement bound (docs/pages/proofs.md, section 8).
 
-Lists of modes are of the numbers as they are. Where more is observed than needed, a mode of exact dimensions is none of
-rounded ones, but what is measured there differs by no more than the rounding, and the loop rests there as before.
+Lists of modes are of the numbers as they are. Where more is observed than needed, a mode of exact dimensions is not one
+of rounded ones, but its measured values differ by no more than the rounding, and the servo loop has an equilibrium
+there as before.
 """
 
 from __future__ import annotations
@@ -33,10 +34,12 @@ from .self_motions import bodies_apart
 
 @dataclass(frozen=True, eq=False, repr=False)
 class NearMode(AssemblyMode):
-    """A pose whose measured values differ from the goal's by ``angle`` at most (rad; lengths in characteristic
-    lengths), ``distance`` (m) and ``turned`` (rad) from the goal's. ``stable``: whether the difference has an isolated
-    minimum there, which attracts the loop; None where the robot was not assembled. ``family``: it is one of a
-    connected set of poses, no isolated minimum."""
+    """Near mode: pose whose measured values differ from the goal's by ``angle`` at most (rad; lengths in characteristic
+    lengths), at ``distance`` (m) and ``turned`` (rad) from the goal's.
+
+    ``stable``: True if the difference has an isolated minimum there, which attracts the servo loop; None if the robot
+    was not assembled. ``family``: one of a continuous family of poses, not an isolated minimum.
+    """
 
     angle: Annotated[float, "largest difference of a measured value (rad; lengths in characteristic lengths)"] = 0.0
     distance: Annotated[float, As("distance_m"), "from the goal"] = 0.0
@@ -46,19 +49,19 @@ class NearMode(AssemblyMode):
 
     @property
     def differs(self) -> str:
-        """By how much what is measured differs at most, and how far away the pose is."""
+        """Largest difference of a measured value, and the distance of the pose, as text."""
         far = (
-            f"{1e3 * self.distance:.3g} mm away"
+            f"at {1e3 * self.distance:.3g} mm"
             if self.distance > SAME_NEAR_POSE * self.length
-            else (f"turned by {np.degrees(self.turned):.3g}°")
+            else (f"rotated by {np.degrees(self.turned):.3g}°")
         )
         return f"by {degrees(self.angle)}, {far}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StationaryPose(Value):
-    """A closed configuration at which the difference of measured values is stationary, the largest of these differences
-    (rad); whether it is an ``isolated`` minimum, which attracts the loop, or one of a ``family`` of poses with
+    """Closed configuration at which the difference of measured values is stationary, the largest of these differences
+    (rad); ``isolated``: a minimum, which attracts the servo loop; ``family``: one of a continuous family with
     differences up to a bound."""
 
     configuration: ClosedConfiguration
@@ -70,9 +73,9 @@ class StationaryPose(Value):
 def descend(
     start: ClosedConfiguration, observation_model: ObservationModel, held: FixedValuesTask, bound: float
 ) -> StationaryPose | None:
-    """The stationary difference of what is held to which Gauss and Newton's method leads on the closed loops; None
-    where it leads to none, or the loops open. Where the values leave a freedom, a family is a motion either way with
-    differences up to ``bound`` (rad)."""
+    """Return the stationary difference to which Gauss-Newton steps lead on the closed loops; None if there is none, or
+    if the loops open. Where the values leave a dof, a family is a motion either way with differences up to ``bound``
+    (rad)."""
     at, model = start, start.model
     error, motions, rates = _changes(at, held)
     for _ in range(NEAR_MODE_STEPS):
@@ -101,13 +104,14 @@ def descend(
 
 
 def _largest(error: Array, held: FixedValuesTask) -> float:
-    """The largest angle (rad) of the differences of what is held, one below the other (rows,)."""
+    """Return the largest angle (rad) of the differences of fixed values, one below the other (rows,)."""
     parts = np.split(error, np.cumsum([o.size for o, _ in held.measured])[:-1])
     return 2 * float(np.arcsin(min(1.0, max((float(np.linalg.norm(part)) for part in parts), default=0.0) / 2)))
 
 
 def _changes(at: ClosedConfiguration, held: FixedValuesTask) -> tuple[Array, Array, Array]:
-    """How far what is held is off (rows,), the motions of the loops (nv, k) that change it, and its rates (rows, k)."""
+    """Return the errors of the fixed values (rows,), the motions of the loops (nv, k) that change them, and their rates
+    (rows, k)."""
     error, rates = held.error_and_jacobian(at.model, at.q)
     kernel = at.kernel()[0]
     _, sizes, ways = np.linalg.svd(rates @ kernel, full_matrices=False)
@@ -190,12 +194,12 @@ def _near(
 
 
 def degrees(angle: float) -> str:
-    """An angle (rad) in degrees, at least so large as to be no zero."""
+    """Return an angle (rad) in degrees, rounded, never as zero."""
     return f"{max(float(np.degrees(angle)), 1e-9):.1g}°"
 
 
 def poses_alike(modes: Sequence[AssemblyMode], near: Sequence[NearMode]) -> str:
-    """How many poses a measurement with an error does not tell apart, and what those other than the goal are."""
+    """Return the number of poses that a measurement with an error does not distinguish, and their kinds."""
     count = len(modes) + len(near)
     exact = sum(not mode.goal for mode in modes)
     others = [f"{exact} with the same values"] * bool(exact)
@@ -209,7 +213,7 @@ def poses_alike(modes: Sequence[AssemblyMode], near: Sequence[NearMode]) -> str:
 
 
 def distance_from(motion: PlatformMotion, goal: ClosedConfiguration, mode: AssemblyMode) -> tuple[float, float]:
-    """How far the platform is from its pose at the goal (m, rad)."""
+    """Return the platform's distance from its pose at the goal (m, rad)."""
     home, there = goal.pose(motion.link), mode.pose
     at = np.array([there.x, there.y, there.z], dtype=float)
     return float(np.linalg.norm(at - motion.position(home))), (
@@ -218,7 +222,7 @@ def distance_from(motion: PlatformMotion, goal: ClosedConfiguration, mode: Assem
 
 
 def measurement_bound(cone: float | str) -> float:
-    """An error of measurements (rad) as a user writes it, 0 for none; raises ``BadRequest``."""
+    """Return a measurement bound (rad) as a user writes it, 0 for none; raises ``BadRequest``."""
     try:
         exact = plain_number(str(cone).removesuffix("deg").strip()) == 0
     except ValueError:

@@ -1,5 +1,5 @@
-"""What is seen of the platform from the base, or of the base from the platform, as curves and surfaces on which points
-are, angles that directions keep, and conditions on a pose (docs/pages/proofs.md, section 8).
+"""Observations of the platform from the base, or of the base from the platform, as loci of points, constant angles of
+directions, and conditions on a pose (docs/pages/proofs.md, section 8).
 
 Lines, planes and axes count without their sense: a pose at which a value is the opposite one is *antipodal*, no mode.
 """
@@ -41,8 +41,8 @@ class PlatformObservation:
     back: bool
 
     def error(self, exact: float, goal: ClosedConfiguration) -> float:
-        """How far a point of its curves within the robot's extent can be from the exact one (m), where a point of the
-        robot is known to ``exact``."""
+        """Return how far a point of its curves within the robot's extent can be from the exact one (m), if a point of
+        the robot is known to ``exact``."""
         points = [each.place for each in self.loci if not each.turns] + [
             each.through for each in self.loci if not each.turns
         ]
@@ -59,8 +59,8 @@ class PlatformObservation:
 def sights(
     decomposition: LegDecomposition, observation_model: ObservationModel, goal: ClosedConfiguration
 ) -> tuple[ObservationModel, tuple[PlatformObservation, ...]]:
-    """What is measured of legs, by their labels, and the sights. Raises ``UnsupportedLocus`` where what an observation
-    leaves is not known, or what is observed is neither a leg's nor between base and platform."""
+    """Return the observations of legs, by their labels, and the others. Raises ``UnsupportedLocus`` if the locus of an
+    observation is not known, or if it is neither of a leg nor between base and platform."""
     base, bodies = decomposition.mechanism.base, leg_ends(decomposition)
     found, rest = list[PlatformObservation](), list[Observation]()
     for each in observation_model.observations:
@@ -72,7 +72,9 @@ def sights(
         elif isinstance(each, CameraObservation | SeenAxis) and base in ends and body in bodies:
             loci = each.loci(each.sighting(goal.pose(reference), goal.pose(each.link)))
             if not loci or decomposition.point is not None:
-                raise UnsupportedLocus(decomposition.mechanism.name, f"what {each.kind} {each.leg} leaves is not known")
+                raise UnsupportedLocus(
+                    decomposition.mechanism.name, f"the locus of {each.kind} {each.leg} is not known"
+                )
             found.append(PlatformObservation(each, body, loci, body == reference))
         else:
             rest.append(_of_leg(decomposition, each))
@@ -98,17 +100,19 @@ def _of_leg(decomposition: LegDecomposition, seen: Observation) -> Observation:
 
 
 def _with_sights(confined: TipLoci, seen: Sequence[PlatformObservation], goal: ClosedConfiguration) -> TipLoci:
-    """A platform with what is seen of it too. Raises ``UnsupportedLocus`` where that are no points on curves or
-    surfaces of the base: cameras on the platform beside legs that hold it, angles in a plane."""
+    """Return a platform with its observations. Raises ``UnsupportedLocus`` if these are not points on loci in the base:
+    cameras on the platform beside legs that restrict it, angles in a plane."""
     turning = confined.motion in ("spatial", "oriented")
     sides = {each.back for each in seen if not _symmetric(each)} if turning or confined.motion == "planar" else set()
     back = sides == {True}
     if len(sides) > 1 or (back and (confined.tips or confined.angles)):
-        raise UnsupportedLocus(goal.model.mechanism.name, "cameras on the platform, and what the base holds of it")
+        raise UnsupportedLocus(
+            goal.model.mechanism.name, "cameras on the platform, and legs or observations from the base"
+        )
     tips, angles = list(confined.tips), list(confined.angles)
     for each in seen:
         X, label = goal.pose(each.body), each.seen.leg
-        turned = each.back != back  # camera and what it sees change places: all is symmetric, or nothing turns
+        turned = each.back != back  # camera and point change places: all is symmetric, or nothing rotates
         for locus in each.loci:
             if locus.turns and confined.motion == "planar":
                 raise UnsupportedLocus(goal.model.mechanism.name, f"{each.seen.kind} {label} keeps an angle in a plane")
@@ -124,8 +128,8 @@ def _with_sights(confined: TipLoci, seen: Sequence[PlatformObservation], goal: C
 
 
 def all_loci(measured: MeasuredRobot, goal: ClosedConfiguration) -> tuple[TipLoci, tuple[PlatformObservation, ...]]:
-    """Where tips of legs and seen points can be, all other measurements held; and sights. Raises
-    ``UnsupportedLocus``."""
+    """Return the loci of tips of legs and observed points, all other measured values fixed; and the observations.
+    Raises ``UnsupportedLocus``."""
     setup = measured.setup
     rest, seen = sights(setup.decomposition, measured.observation_model, goal)
     if not seen:
@@ -141,7 +145,7 @@ def all_loci(measured: MeasuredRobot, goal: ClosedConfiguration) -> tuple[TipLoc
 
 
 def _unheld(measured: MeasuredRobot, goal: ClosedConfiguration) -> TipLoci:
-    """A platform that no leg holds. Raises ``UnsupportedLocus`` where legs restrict how it moves."""
+    """Return a platform without a leg. Raises ``UnsupportedLocus`` if legs restrict its motion."""
     decomposition, dof = measured.setup.decomposition, measured.setup.dof
     bodies, (motion, normal) = leg_ends(decomposition), measured.moving
     if len(bodies) > 1 or dof != {"translations": dof, "planar": 3, "spatial": 6}[motion]:
@@ -150,12 +154,13 @@ def _unheld(measured: MeasuredRobot, goal: ClosedConfiguration) -> TipLoci:
 
 
 def _symmetric(sight: PlatformObservation) -> bool:
-    """Whether it says the same of the camera as seen from the point: a distance, a place, angles."""
+    """Return True if it is the same condition on the camera relative to the point: a distance, a position, angles."""
     return all(each.turns or len(each.normals) in (0, 3) for each in sight.loci)
 
 
 def _reach(locus: FixedValueLocus, plane: Array | None) -> Reach | None:
-    """Where a point can be that moves in space, or in the plane through it with a normal; None: anywhere there."""
+    """Return the locus of a point that moves in space, or in the plane through it with a normal; None: anywhere
+    there."""
     if plane is None:
         if locus.radius is not None:
             return Sphere(locus.through, locus.radius)
@@ -173,8 +178,8 @@ def _reach(locus: FixedValueLocus, plane: Array | None) -> Reach | None:
 
 
 def conditions(seen: Sequence[PlatformObservation], middle: OriginAndUnit, turned: bool) -> list[PoseCondition]:
-    """The conditions on the platform's pose, counted from the goal, where a camera on it sees with moving planes; or,
-    ``turned``, on the base's as the platform sees it."""
+    """Return the conditions on the platform's pose, relative to the goal, of a camera on it that observes moving
+    planes; or, ``turned``, on the base's relative to the platform."""
     found, none, up = list[PoseCondition](), np.zeros(3), np.array([0.0, 0.0, 1.0])
     for each in seen:
         label, back = each.seen.leg, each.back != turned
@@ -202,7 +207,7 @@ Poses = Callable[[str], Array]
 
 
 def opposite(seen: Sequence[Observation], goal: ClosedConfiguration, reference: str, pose: Poses) -> tuple[str, ...]:
-    """The observations whose value at a pose of the links is not that of the goal: the opposite one."""
+    """Return the observations whose value at a pose of the links is the opposite of the goal's."""
     return tuple(each.leg for each in seen if not _same_value(each, each.seen_from or reference, goal, pose))
 
 
@@ -216,8 +221,8 @@ def _same_value(seen: Observation, reference: str, goal: ClosedConfiguration, po
 
 
 def behind(observed: Sequence[Observation], pose: Poses) -> tuple[str, ...] | None:
-    """The observed points and circles that are not in front of the cameras by which they are seen, by their names:
-    z ≤ 0 in the camera's frame; None where no camera with a name sees a point."""
+    """Return the observed points and circles that are not in front of their cameras, by their names: z ≤ 0 in the
+    camera's frame; None if no named camera observes a point."""
     points = [o for o in observed if isinstance(o, CameraObservation) and o.camera is not None and o.images_point]
     if not points:
         return None

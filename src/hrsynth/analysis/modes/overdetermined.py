@@ -1,4 +1,4 @@
-"""Which solutions of a square part fit the legs that it leaves out, where more is observed than needed (proofs.md 8).
+"""Solutions of a square part that fit the legs that it leaves out, with redundant observation (proofs.md 8).
 
 A solution is *excluded* where the tips of its enclosure are off what a leg can reach, in ball arithmetic. That it is a
 mode is proved only of the goal, at which all tips fit by construction: a match in floats proves nothing.
@@ -23,17 +23,18 @@ from .roots import PRECISION
 
 
 def tip_rounding(system: System, at: Array) -> float:
-    """How far a tip that floats put at ``at`` (3,) can be from that of the exact input at the same pose (m)."""
+    """Return how far a tip that floats put at ``at`` (3,) can be from that of the exact input at the same pose (m)."""
     return system.error + TIP_ROUNDING * (system.size + length(at))
 
 
 def off(system: System, k: int, at: Array, shift: float, turn: float) -> float:
-    """How far the exact tip of a leg is from ``at`` (3,) at most (m), at a pose enclosed to ``shift`` and ``turn``."""
+    """Return how far the exact tip of a leg is from ``at`` (3,) at most (m), at a pose enclosed to ``shift`` and
+    ``turn``."""
     return shift + turn * length(system.tips[k]) + tip_rounding(system, at)
 
 
 def meets(system: System, q: Array, goal: Array, shift: float, turn: float) -> bool:
-    """Whether the exact pose about ``q`` can be that about ``goal``: all its tips can."""
+    """Return True if the exact pose about ``q`` can be that about ``goal``: all its tips can."""
     return all(
         length(one - other) <= off(system, k, one, shift, turn) + tip_rounding(system, other)
         for k, (one, other) in enumerate(zip(system.tips_at(q), system.tips_at(goal), strict=True))
@@ -41,8 +42,8 @@ def meets(system: System, q: Array, goal: Array, shift: float, turn: float) -> b
 
 
 def is_excluded(system: System, q: Array, shift: float, turn: float) -> bool:
-    """Whether no pose within ``shift`` and ``turn`` of q, one of which is exact, fits all legs: a condition on a tip is
-    not zero anywhere in the ball that holds it. The worst legs are tried first."""
+    """Return True if no pose within ``shift`` and ``turn`` of q, one of which is exact, fits all legs: a condition on a
+    tip is not zero anywhere in the ball that contains it. The worst legs are tried first."""
     from flint import ctx
 
     at, frame = system.tips_at(q), system.frame
@@ -61,8 +62,8 @@ def is_excluded(system: System, q: Array, shift: float, turn: float) -> bool:
 
 
 def torn(system: System, places: Mapping[int, tuple[Array, float]]) -> bool:
-    """Whether tips of a rigid platform, at ``places`` (3,) known to a distance (m), are farther apart or nearer than
-    they are on it: no pose brings them there."""
+    """Return True if tips of a rigid platform, at ``places`` (3,) known to a distance (m), are farther from or nearer
+    to each other than they are on it: no pose brings them there."""
     from flint import ctx
 
     frame = system.frame
@@ -80,22 +81,22 @@ def torn(system: System, places: Mapping[int, tuple[Array, float]]) -> bool:
 
 
 def words(goal: bool, lost: bool, fitting: Sequence[float], out: int, open_: int) -> str:
-    """What the legs say of all solutions: whether one is the goal, or it is ``lost`` among them, the residuals of those
-    that fit, how many are excluded and how many are not decided."""
+    """Verdict of the legs on all solutions: whether one is the goal, or it is ``lost`` among them, the residuals of
+    those that fit, how many are excluded and how many are undecided."""
     parts = [f"{'none' if lost else 'one'} is the goal, at which all legs fit by construction"] if goal else []
     if fitting:
         parts.append(
-            f"{len(fitting)} fit{'s' * (len(fitting) == 1)} all legs to {max(fitting):.1e} of the robot's "
-            "size, which does not prove it"
+            f"{len(fitting)} fit{'s' * (len(fitting) == 1)} all legs to {max(fitting):.1e} characteristic "
+            "lengths, which does not prove it"
         )
     parts.append(f"{out} excluded by the legs in interval arithmetic" if out else "none excluded")
     if open_:
-        parts.append(f"{open_} neither excluded nor found to fit")
+        parts.append(f"{open_} undecided")
     return ", ".join(parts)
 
 
 STARTS = 40
-"""Random poses from which a pose of a continuum is looked for."""
+"""Number of random poses from which a pose of a continuous family is sought."""
 
 
 def residual(system: System, q: Array) -> float:
@@ -119,7 +120,7 @@ def stationary(system: System, starts: Sequence[Array], known: Sequence[Array]) 
 
 
 def dimension(system: System) -> int | None:
-    """The largest dimension of the real poses about one that closes; None where none is found."""
+    """Return the largest dimension of the real poses about one that closes; None if none is found."""
     rng = np.random.default_rng(0)
     found = []
     for _ in range(STARTS):
@@ -145,7 +146,7 @@ def _slopes(system: System, q: Array, step: float = 1e-6) -> Array:
 
 
 def _apart(system: System, one: Array, other: Array) -> float:
-    """How far two poses, or the tips of two bodies, are from each other (sizes, pure numbers)."""
+    """Return the difference of two poses, or of the tips of two bodies (sizes, pure numbers)."""
     X, Y = system.pose(one), system.pose(other)
     moved = (X[:3, 3] - Y[:3, 3], system.misses(one) - system.misses(other))
     turned = float(np.abs(X[:3, :3] - Y[:3, :3]).max())
@@ -154,8 +155,8 @@ def _apart(system: System, one: Array, other: Array) -> float:
 
 @dataclass(frozen=True)
 class SnappedPoints:
-    """Joint centres of some legs (their places among all) that were made one: on the ``platform`` or the ``base``, and
-    how far the one that was farthest from the others was (m)."""
+    """Joint centres of some legs (their indices) that were snapped: on the ``platform`` or the ``base``, and the
+    distance of the farthest one from the others (m)."""
 
     where: str
     legs: tuple[int, ...]
@@ -163,10 +164,10 @@ class SnappedPoints:
 
 
 def snap_centres(system: System) -> tuple[System, tuple[SnappedPoints, ...]]:
-    """A system with what is meant made exact, and what that is; its error grows by what was moved.
+    """Return a system with nearly coinciding centres snapped, and which were; its error grows by the distance moved.
 
-    Coinciding counts as meant where the largest distance accepted (at most ``MEANT`` sizes) is below the smallest one
-    rejected by ``RANK_GAP``; raises ``GeometryAmbiguous`` where it lies in between.
+    Centres are snapped if the largest distance accepted (at most ``MEANT`` sizes) is below the smallest one rejected by
+    ``RANK_GAP``; raises ``GeometryAmbiguous`` if it is in between.
     """
     if system.as_written or not isinstance(system, Spatial):
         return system, ()
@@ -182,7 +183,7 @@ def snap_centres(system: System) -> tuple[System, tuple[SnappedPoints, ...]]:
     smallest = min((each[0] for each in apart if each not in accepted), default=np.inf)
     if largest * RANK_GAP > smallest:
         raise GeometryAmbiguous(
-            "joint centres that may be meant to be one", largest / system.size, smallest / system.size, RANK_GAP
+            "joint centres that may coincide", largest / system.size, smallest / system.size, RANK_GAP
         )
     if largest == 0.0:
         return system, ()
@@ -202,7 +203,7 @@ def snap_centres(system: System) -> tuple[System, tuple[SnappedPoints, ...]]:
 
 
 def _groups(pairs: list[tuple[int, int]]) -> list[tuple[int, ...]]:
-    """Those that are joined by pairs, together."""
+    """Return those that are joined by pairs, together."""
     groups: list[set[int]] = []
     for pair in pairs:
         joined = [group for group in groups if group & set(pair)]

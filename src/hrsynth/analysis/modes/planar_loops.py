@@ -57,7 +57,7 @@ class PlanarLoop:
 
 @dataclass(frozen=True, eq=False)
 class SumPart:
-    """The real part of a loop, or the ``imaginary`` one, in cos ψ, sin ψ and t, numbers known to ``slack`` (sizes)."""
+    """Real part of a loop, or the ``imaginary`` one, in cos ψ, sin ψ and t, numbers known to ``slack`` (sizes)."""
 
     loop: PlanarLoop
     imaginary: bool
@@ -127,18 +127,18 @@ class PlanarLoops(System):
     goal: ClosedConfiguration
     normal: Array
     turns: dict[str, Exponents]
-    """E: by how many of each ψ a link turns."""
+    """E: how many times a link rotates with each ψ."""
     shifts: dict[str, Sum]
-    """How far each link's origin is shifted: the point that is at the frame's at the goal, for a turn about that."""
+    """Shift of each link's origin: the point that is at the frame's at the goal, for a rotation about that."""
     moves: dict[str, tuple[int, float]]
-    """The slide of each P, and how many times its length the joint's coordinate changes by."""
+    """Slide of each P, and the factor from its length to the joint's coordinate."""
     loops: tuple[PlanarLoop, ...]
     angles: int
     slides: int
     bodies: tuple[str, ...]
     point: Array | None
     besides: tuple[PlanarLoop, ...]
-    """What is measured besides: it vanishes too."""
+    """Further measured values: they vanish too."""
 
     freedoms = 3
 
@@ -149,7 +149,7 @@ class PlanarLoops(System):
 
     @property
     def slack(self) -> float:
-        """How far the numbers of a loop, sums of differences of points, can be from the exact ones (sizes)."""
+        """Error of the numbers of a loop, sums of differences of points (sizes)."""
         return 2.0 * (1 + len(self.loops)) * self.error / self.size
 
     @property
@@ -179,7 +179,7 @@ class PlanarLoops(System):
 
     @cached_property
     def most(self) -> int:
-        """How many isolated closings the degrees allow, with unknowns eliminated or not."""
+        """Bound of the isolated closed configurations from degrees, with unknowns eliminated or not."""
         groups = groupings(self.angles, self.slides, [loop.used_coordinates() for loop in self.loops])
         return min(self.residues.most_by_degrees(), *(bezout(self.forms, each) for each in groups))
 
@@ -194,7 +194,7 @@ class PlanarLoops(System):
         return pose(start[:3, 3] + moved, rotation_about(self.normal, angle) @ start[:3, :3])
 
     def body_poses(self, q: Array) -> dict[str, Array]:
-        """The poses (4, 4) of the bodies that tell where the platform is."""
+        """Return the poses (4, 4) of the bodies that determine the platform."""
         return {body: self.pose_of(body, q) for body in self.bodies}
 
     def closing(self, q: Array) -> ClosedConfiguration:
@@ -216,7 +216,7 @@ class PlanarLoops(System):
         return ClosedConfiguration.of(model, close(model, model.integrate(self.goal.q, step), tolerance=SOLVED)[0])
 
     def pose_terms(self, x: Sequence[Any]) -> list[Any]:
-        """What tells the pose of the bodies, each with its conjugate, at balls (cos ψ, sin ψ, t)."""
+        """Return the components of the bodies' pose, each with its conjugate, at balls (cos ψ, sin ψ, t)."""
         found: list[Any] = []
         for body in self.bodies:
             e = self.turns[body]

@@ -1,4 +1,4 @@
-"""All modes of a planar mechanism: as many closings as there may be, each in a box of its own."""
+"""Modes of a planar mechanism: as many solutions as there may be, each in a box of its own."""
 
 from __future__ import annotations
 
@@ -59,8 +59,8 @@ def proposals(forms: Sequence[dict[Exponents, complex]], angles: int, enough: in
 
 
 def solve_loops(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0) -> tuple[Model, SystemModes]:
-    """All modes, with the goal known to ``error`` (m). Raises ``UnsupportedLocus``, and ``Unsolved`` where not all
-    closings are enclosed that there may be."""
+    """All modes, with the goal known to ``error`` (m). Raises ``UnsupportedLocus``, and ``SystemNotSolved`` where not
+    all closings are enclosed that there may be."""
     refused = list[SystemNotSolved]()
     for system in islice(systems(measured, goal), LOOP_SYSTEMS):
         system = replace(system, error=system.error + error)
@@ -84,24 +84,24 @@ def _judge(system: PlanarLoops) -> SystemModes:
     size = f"{loops}, {angles} and {slides}"
     most, why, bound = system.most, "degrees in groups of unknowns (Bézout)", "class"
     if most > LARGEST_LOOPS:
-        raise SystemNotSolved("the loops", f"{size}: up to {most} closings, too many (at most {LARGEST_LOOPS})")
+        raise SystemNotSolved("the loops", f"{size}: up to {most} solutions, too many (at most {LARGEST_LOOPS})")
     boxes, lost = _enclose(system, proposals(system.forms, system.angles, most))
     if len(boxes) < most and (fewer := system.residues.most_by_ranks(len(boxes))) is not None and fewer < most:
         most, why, bound = fewer, "ranks modulo a prime of 62 bits", "rank"
     start = np.array([1.0] * system.angles + [0.0] * (system.angles + system.slides))
     at_goal = [box for box in boxes if box.real and box.holds(start)]
     if len(boxes) < most or lost or len(at_goal) != 1:
-        raise SystemNotSolved("the loops", f"{size}: of {most} closings at most ({why}) {len(boxes)} have boxes")
+        raise SystemNotSolved("the loops", f"{size}: of {most} solutions at most ({why}) {len(boxes)} have boxes")
     seen = [system.pose_terms(_balls(box)) for box in boxes]
     if any(
         all((a - b).contains(0) for a, b in zip(one, other, strict=True))
         for k, one in enumerate(seen)
         for other in seen[:k]
     ):
-        raise SystemNotSolved("the loops", f"{size}: several of {most} closings have one pose of the platform")
+        raise SystemNotSolved("the loops", f"{size}: several of {most} solutions have one pose of the platform")
     real = [box for box in boxes if box.real]
     proof = (
-        f"{size}: at most {most} closings by {why}, {len(boxes)} enclosed apart from each other, complex ones "
+        f"{size}: at most {most} solutions by {why}, {len(boxes)} enclosed, all distinct, complex ones "
         f"too, {len(real)} real"
     )
     if not system.besides:
@@ -118,7 +118,7 @@ def enclosures(system: PlanarLoops) -> list[PoseBox]:
 
 
 def is_excluded(system: PlanarLoops, box: PoseBox) -> bool:
-    """Whether something that is measured besides is another at each closing in a real box."""
+    """Return True if a further measured value is another at each solution in a real box."""
     return any(
         not SumPart(each, part, system.slack).value(_balls(box)).contains(0)
         for each in system.besides

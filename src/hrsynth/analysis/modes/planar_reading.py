@@ -26,14 +26,14 @@ KINDS = (JointType.REVOLUTE, JointType.PRISMATIC)
 
 
 def planar_loops(measured: MeasuredRobot, goal: ClosedConfiguration) -> PlanarLoops:
-    """The mechanism with the measurements at a configuration. Raises ``UnsupportedLocus`` where it is not planar, or
-    what is measured are not directions and joints' coordinates, as many as it has freedoms."""
+    """Read the mechanism with the measured values at a configuration. Raises ``UnsupportedLocus`` if it is not planar,
+    or if the observations are not directions and joints' coordinates, as many as the dof."""
     return next(systems(measured, goal))
 
 
 def systems(measured: MeasuredRobot, goal: ClosedConfiguration) -> Iterator[PlanarLoops]:
-    """The mechanism, with more and more left to be measured besides; last where loops that are left out ask more than
-    their own unknowns can meet, so that closings of the others need not be closings. Raises ``UnsupportedLocus``."""
+    """Yield the mechanism, with fewer and fewer values locked in its loops; last those whose left out loops have more
+    conditions than unknowns, so that solutions of the others need not close them. Raises ``UnsupportedLocus``."""
     seen, reason, tight, looser = measured.observation_model.observations, "", False, list[PlanarLoops]()
     for size in range(len(seen), 0, -1):
         for chosen in combinations(seen, size):
@@ -41,8 +41,8 @@ def systems(measured: MeasuredRobot, goal: ClosedConfiguration) -> Iterator[Plan
             found = reading.system([each for each in seen if each not in chosen])
             if isinstance(found, str):
                 reason = reason or found
-            elif not found.most:  # what is chosen holds some loop twice
-                reason = reason or "what is measured does not hold its loops"
+            elif not found.most:  # the choice locks some loop twice
+                reason = reason or "the measured values do not lock its loops"
             elif reading.more:
                 looser.append(found)
             else:
@@ -77,13 +77,13 @@ class _Reading:
         self.places = {link: i for i, link in enumerate(self.mechanism.links)}
         self.dropped = 0.0
         self.more = False
-        """Whether the loops that are left out ask more than their own unknowns can meet."""
+        """Return True if the left out loops have more conditions than their own unknowns can meet."""
 
     def _refuse(self, reason: str) -> UnsupportedLocus:
         return UnsupportedLocus(self.mechanism.name, reason)
 
     def _displacement(self, link: str) -> Array:
-        """How a link is displaced at the goal since zero (4, 4)."""
+        """Return the displacement of a link at the goal since zero (4, 4)."""
         return self.goal.pose(link) @ self.mechanism.links[link].inverse
 
     def _centre(self, joint: Joint) -> Array:
@@ -168,7 +168,7 @@ class _Reading:
         geared = [joint for _, _, *both in self._gears() for joint in both if not joint.type.slides]
         for name, ratio, one, other in self._gears():
             if one.type.slides is not other.type.slides:
-                raise self._refuse(f"coupling {name} is of a turn and a slide")
+                raise self._refuse(f"coupling {name} joins a rotation and a translation")
             if not one.type.slides:
                 q = Fraction(ratio).limit_denominator(LARGEST_GEAR)
                 if abs(float(q) - ratio) > SAME_GEOMETRY or abs(q) > LARGEST_GEAR:
@@ -187,7 +187,7 @@ class _Reading:
                 self.mechanism.links, list({j.name: j for j in geared}.values()), [0.0] * len(geared)
             )
         ) < len({joint.name for joint in geared}):
-            raise self._refuse("its gears form a cycle")
+            raise self._refuse("its couplings form a cycle")
         tied = whole_kernel(rows)
         assert tied is not None
         equal = [*(joint.links for joint in self.joints if joint.type.slides), *self._held_pairs(self.seen)]
@@ -198,7 +198,7 @@ class _Reading:
             whole=True,
         )
         if rest is None:
-            raise self._refuse("its gears have several positions for what is measured")
+            raise self._refuse("its couplings have several positions for the measured values")
         return {
             link: tuple(sum(a * b for a, b in zip(places[i], each, strict=True)) for each in rest)
             for link, i in self.places.items()
@@ -228,14 +228,14 @@ class _Reading:
             yield each.name, each.ratio, carriers[each.predecessor], carriers[each.successor]
 
     def _moves(self) -> dict[str, tuple[int, float]]:
-        """The number of each P's slide, -1 where it is held, and how many times its length the P moves."""
+        """Return the number of each P's slide, -1 where it is fixed, and how many times its length the P moves."""
         sliding = [joint.name for joint in self.joints if joint.type.slides]
         roots = {name: (name, 1.0) for name in sliding}
         for name, ratio, one, other in self._gears():
             if one.type.slides:
                 (a, f), (b, g) = roots[one.name], roots[other.name]  # g b = ratio f a
                 if a == b:
-                    raise self._refuse(f"coupling {name} ties what is tied")
+                    raise self._refuse(f"coupling {name} joins coupled joints")
                 for each, (root, factor) in list(roots.items()):
                     if root == b:
                         roots[each] = a, factor * ratio * f / g
@@ -248,7 +248,7 @@ class _Reading:
     def _loops(
         self, turns: dict[str, Exponents], moves: dict[str, tuple[int, float]]
     ) -> tuple[dict[str, Sum], list[Sum]]:
-        """How each link's frame is shifted, and what vanishes for each joint besides a spanning tree."""
+        """Return the shift of each link's frame, and the closure equations of each joint besides a spanning tree."""
         still = (-1, (0,) * len(turns[self.mechanism.base]))
         tree = graphs.spanning_forest(self.mechanism.links, self.joints, [0.0] * len(self.joints))
         origins: dict[str, Sum] = {self.mechanism.base: {}}
@@ -286,7 +286,7 @@ class _Reading:
         return None
 
     def _step(self, joint: Joint, turns: dict[str, Exponents], moves: dict[str, tuple[int, float]]) -> Sum:
-        """By how much the successor's origin is shifted more than the predecessor's."""
+        """Return the difference of the successor's and the predecessor's origin shift."""
         if joint.type.slides:
             k, factor = moves[joint.name]
             along = factor * complex(*(self.frame @ self.axes[joint.name] * self.goal.model.length))
@@ -295,7 +295,7 @@ class _Reading:
         return self._sum({(-1, turns[joint.predecessor]): centre}, {(-1, turns[joint.successor]): centre}, -1)
 
     def _sum(self, one: Sum, other: Sum, factor: int = 1) -> Sum:
-        """one + factor × other; what is nothing to rounding is left out."""
+        """Return one + factor × other, without what rounding makes zero."""
         total = dict(one)
         for key, a in other.items():
             total[key] = total.get(key, 0j) + factor * a

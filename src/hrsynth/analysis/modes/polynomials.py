@@ -26,11 +26,11 @@ if TYPE_CHECKING:
     from flint import fmpz, fmpz_poly
 
 ATTEMPTS = 3
-"""Boxes that are tried, each wider than the one before where that one was too narrow."""
+"""Boxes that are tried, each wider than the one before if that one was too narrow."""
 
 
 class Polynomial(Protocol):
-    """What the operator asks of an equation in n unknowns."""
+    """Equation in n unknowns, as the Krawczyk operator needs it."""
 
     def value(self, x: Sequence[Any]) -> Any:
         """The value at balls x (n,)."""
@@ -76,7 +76,7 @@ class Quadric(NamedTuple):
 
 
 def krawczyk(equations: Sequence[Polynomial], start: Sequence[Any]) -> list[Any] | None:
-    """A box about the balls ``start``, all real or all complex, that is proved to hold exactly one solution, for all
+    """A box about the balls ``start``, all real or all complex, that is proved to contain exactly one solution, for all
     coefficients in their balls.
 
     None where the proof fails, as it does at a double solution.
@@ -128,8 +128,8 @@ class Eliminant:
     """The polynomial in the kept unknown, and the other unknowns at a root.
 
     ``bound`` is the degree that it has when no solution lies at infinity. ``others`` gives, for a ball about a root,
-    the balls of the other unknowns; where a denominator cannot be told from zero these are not finite. ``several``
-    gives for such a root all that the other unknowns can be, or None where that cannot be told.
+    the balls of the other unknowns; where a denominator may be zero these are not finite. ``several`` gives for such a
+    root all that the other unknowns can be, or None where that is not known.
     """
 
     polynomial: fmpz_poly
@@ -261,8 +261,8 @@ def _exact(norm: fmpz_poly, divisor: fmpz_poly) -> fmpz_poly:
 
 
 def _two(c: Sequence[Any]) -> list[Any] | None:
-    """The two roots of c₂ y² + c₁ y + c₀ as balls apart from each other; None where they cannot be told apart or from
-    infinity."""
+    """Return the two roots of c₂ y² + c₁ y + c₀ as disjoint balls; None if they cannot be separated, or are not
+    finite."""
     below = c[1] * c[1] - 4 * c[2] * c[0]
     if c[2].contains(0) or below.contains(0):
         return None

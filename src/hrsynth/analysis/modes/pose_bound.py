@@ -1,4 +1,4 @@
-"""At most how many poses meet conditions: ranks modulo a prime (docs/pages/proofs.md, section 8).
+"""Root bound of poses that meet conditions: ranks modulo a prime (docs/pages/proofs.md, section 8).
 
 I_t are the multiples of the conditions among the forms of degree t, and w = q · q. If wᵏ S_{t-2k} lies in
 wᵏ⁺¹ S_{t-2k-2} + I_t, S the forms, then each function of the pose is, modulo the conditions, one of the degree
@@ -7,8 +7,8 @@ by their values at random points modulo the prime. A rank modulo a prime is at m
 that of wᵏ S + I_t is the same unless the prime divides one certain minor, which fewer than 10⁶ of the 10¹⁷ primes of
 62 bits do.
 
-Where a condition is a form of degree 2 all is asked modulo it: of forms without the powers of an unknown that it gives
-by the others, at points where it holds. They are known there if so many points tell all of them apart: it is checked.
+If a condition is a form of degree 2 all is computed modulo it: of forms without the powers of an unknown that it gives
+by the others, at points that meet it. They are known there if so many points separate all of them: it is checked.
 """
 
 from __future__ import annotations
@@ -101,8 +101,8 @@ class _Quotient:
 
     @classmethod
     def of(cls, forms: SquareForms, t: int) -> _Quotient | None:
-        """Modulo the first condition, for degrees up to t; None where it gives no unknown, or points do not tell the
-        forms apart."""
+        """Return the forms modulo the first condition, for degrees up to t; None if it gives no unknown, or if points
+        do not separate the forms."""
         (a, m), one = forms.shape, forms.others[0]
         if one.degree > 1 or len(forms.others) < 2:
             return None

@@ -35,7 +35,7 @@ class Zero:
     condition: PoseCondition
     poses: Poses
     slack: float | None
-    """How far a number can be from the exact one (sizes); None: the numbers are exact."""
+    """Difference of a number from the exact one (sizes); None: the numbers are exact."""
 
     @cached_property
     def _tensors(self) -> tuple[Any, Any]:
@@ -66,7 +66,7 @@ class Zero:
 
     @cached_property
     def _profile(self) -> float:
-        """How much worse the numbers of a profile are known than others."""
+        """Factor by which the numbers of a profile are less exact than others."""
         f = getattr(self.condition, "f", None)
         return 1.0 if f is None else (1.0 + float(np.abs(f).sum())) ** 1.5
 
@@ -123,7 +123,7 @@ class PoseBox:
     box: tuple[Any, ...]
     turned: int
     rounded: bool = False
-    """Whether it is told for the rounded geometry alone: far from real."""
+    """True if it is proved for the rounded geometry alone: far from real."""
 
     def alike(self, x: Array) -> Array:
         """A pose with q and with -q, which are one; shape (2, n)."""
@@ -135,11 +135,11 @@ class PoseBox:
         return poses.turns @ x[: self.turned], poses.moves @ x[self.turned :]
 
     def holds(self, x: Array) -> bool:
-        """Whether a pose is in it."""
+        """Return True if a pose is in it."""
         return bool(np.any(np.all(np.abs(self.alike(x) - self.middle) <= self.radii, axis=1)))
 
     def apart(self, others: Sequence[PoseBox]) -> bool:
-        """Whether no pose is in this one and in one of the others."""
+        """Return True if no pose is in this one and in one of the others."""
         if not others:
             return True
         radii = self.radii + np.array([other.radii for other in others])
@@ -227,7 +227,7 @@ def at_middle(boxes: Sequence[PoseBox], x: Array) -> PoseBox | None:
 
 
 def told_far(boxes: Iterable[PoseBox]) -> str:
-    """How many are told for the rounded geometry alone, in words."""
+    """Return the number proved for the rounded geometry alone, as text."""
     far = sum(box.rounded for box in boxes)
     return f", {far} far from real ones for the rounded geometry" if far else ""
 
@@ -262,7 +262,7 @@ def as_box(box: Sequence[Any] | None, real: bool, turned: int) -> PoseBox | None
 
 
 def excluded_by(conditions: Sequence[PoseCondition], poses: Poses, box: PoseBox, slack: float) -> bool:
-    """Whether one of the conditions is met nowhere in a box, for all input within the slack."""
+    """Return True if one of the conditions is met nowhere in a box, for all input within the slack."""
     from flint import ctx
 
     with ctx.workprec(PRECISION):

@@ -1,6 +1,6 @@
-"""All modes of a rigid platform from the conditions of its legs (docs/pages/proofs.md, section 8).
+"""Modes of a rigid platform from the conditions of its legs (docs/pages/proofs.md, section 8).
 
-At least so many as boxes are apart from each other, complex ones too; at most as the degrees allow.
+The number is at least that of disjoint boxes, complex ones too, and at most that of the degrees.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ class PosedPlatform(System):
     middle: OriginAndUnit
     poses: Poses
     back: bool = False
-    """Whether the pose is that of the base, as the platform sees it."""
+    """True if the pose is that of the base, relative to the platform."""
     seen: tuple[PlatformObservation, ...] = ()
     branches: Mapping[str, int] = field(default_factory=dict)
-    """How many each leg has."""
+    """Number of conditions of each leg."""
 
     freedoms = 6
 
@@ -97,7 +97,7 @@ def pose_platform(measured: MeasuredRobot, goal: ClosedConfiguration) -> list[Po
     found.append(([own], 0.0))
     legs: list[Branches] = [branches for branches, _ in found]
     if prod(map(len, legs)) > BRANCH_CHOICES:
-        raise UnsupportedLocus(name, f"its legs have {prod(map(len, legs))} choices of branches")
+        raise UnsupportedLocus(name, f"its legs have {prod(map(len, legs))} combinations of leg solutions")
     if any(
         abs(float(c.value(c.b, c.c, np.asarray))) > SAME_RELATION * (1.0 + float(np.abs(getattr(c, "f", 0.0)).max()))
         for branches in legs
@@ -145,7 +145,7 @@ def _once(conditions: Sequence[PoseCondition]) -> tuple[tuple[PoseCondition, ...
 
 
 def most_posed(measured: MeasuredRobot, goal: ClosedConfiguration) -> int:
-    """How many modes there are at most, complex ones too. Raises ``UnsupportedLocus``."""
+    """Return a root bound of the modes, complex ones too. Raises ``UnsupportedLocus``."""
     return sum(_forms(measured, each).most for each in pose_platform(measured, goal))
 
 
@@ -153,14 +153,16 @@ def solve_posed(
     measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0, time_limit: float = EFFORT
 ) -> tuple[Model, SystemModes]:
     """All modes of all choices of branches together, with the goal known to ``error`` (m). Raises ``UnsupportedLocus``,
-    and ``Unsolved`` where not all poses are enclosed that there may be, or the choices need more than ``time_limit``
-    (s)."""
+    and ``SystemNotSolved`` where not all poses are enclosed that there may be, or the choices need more than
+    ``time_limit`` (s)."""
     systems = [
         replace(each, error=each.error + max([error, *(sight.error(error, goal) for sight in each.seen)]))
         for each in pose_platform(measured, goal)
     ]
     if not np.isfinite(error):
-        raise UnsupportedLocus(measured.setup.robot.name, "no distance bounds how far it is from where its loops close")
+        raise UnsupportedLocus(
+            measured.setup.robot.name, "the distance to the exact closed configuration is not bounded"
+        )
     (body,) = leg_ends(measured.setup.decomposition)
     first = systems[0]
     X, back = goal.pose(body), inverse(pose(first.middle.origin))
@@ -175,8 +177,8 @@ def solve_posed(
     if needed > max(time_limit, FEW_FORMS_SECONDS * (len(systems) == 1)):
         raise SystemNotSolved(
             "conditions on the pose",
-            f"{len(systems)} choices of branches, {forms.size} forms each, need "
-            f"about {needed:.2g} s: too many (the effort is {time_limit:g} s)",
+            f"{len(systems)} combinations of leg solutions, {forms.size} forms each, need "
+            f"about {needed:.2g} s: too many (the time limit is {time_limit:g} s)",
         )
     for system in systems:
         found.append(_judge(system, _forms(measured, system), system is first))
@@ -186,12 +188,10 @@ def solve_posed(
 
 
 def _forms(measured: MeasuredRobot, system: PosedPlatform) -> SquareForms:
-    """As many of its conditions as freedoms. Raises ``UnsupportedLocus``, ``Unsolved``."""
+    """Return as many of its conditions as dof. Raises ``UnsupportedLocus``, ``SystemNotSolved``."""
     forms = SquareForms.of(system.conditions, system.poses)
     if forms is None:
-        raise UnsupportedLocus(
-            measured.setup.robot.name, "the conditions of its legs do not decide its pose one by one"
-        )
+        raise UnsupportedLocus(measured.setup.robot.name, "the conditions of its legs do not determine isolated poses")
     if forms.size > LARGEST_FORMS:
         raise SystemNotSolved(
             "conditions on the pose",
@@ -229,7 +229,7 @@ def _judge(system: PosedPlatform, forms: SquareForms, own: bool) -> SystemModes:
     complete = len(boxes) == most and (goal is not None) == own
     real = [box for box in boxes if box.real]
     proof = (
-        f"at most {most} pose{'s' * (most != 1)} by {why}, {len(boxes)} enclosed apart from each other, "
+        f"at most {most} pose{'s' * (most != 1)} by {why}, {len(boxes)} enclosed, all distinct, "
         f"complex ones too{told_far(boxes)}, {len(real)} real"
     )
     left = [c for c in system.conditions if c not in forms.planes and c not in forms.others]
@@ -256,7 +256,7 @@ def _judge(system: PosedPlatform, forms: SquareForms, own: bool) -> SystemModes:
 def _mode(system: PosedPlatform, box: PoseBox, proved: bool) -> SystemMode:
     """A real box as a mode."""
     shift = system.size * float(np.linalg.norm(box.radii[box.turned :]))
-    # two unit quaternions at the distance δ are turned against each other by at most 4 asin(δ / 2) ≤ π δ
+    # two unit quaternions at the distance δ are rotated against each other by at most 4 asin(δ / 2) ≤ π δ
     turn = np.pi * float(np.linalg.norm(box.radii[: box.turned]))
     q = system.place(box)
     return SystemMode(

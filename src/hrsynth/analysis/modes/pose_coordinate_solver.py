@@ -31,9 +31,9 @@ from .roots import PRECISION, PRECISIONS, Enclosing, Solution, SolutionSet, all_
 
 @dataclass(frozen=True, eq=False)
 class Proposed:
-    """Solutions that a solver proposes, besides ``extraneous`` ones that are no poses; ``lost``: how many more there
-    may be, ``loose`` whether those may form a continuum; ``far``: the (e, g) (m, 8) at which paths of a homotopy to
-    infinity were left."""
+    """Solutions that a solver proposes, besides ``extraneous`` ones that are not poses; ``lost``: how many more there
+    may be, ``loose`` whether those may form a continuous family; ``far``: the (e, g) (m, 8) at which paths of a
+    homotopy to infinity were left."""
 
     solutions: tuple[Solution, ...]
     method: str
@@ -44,7 +44,7 @@ class Proposed:
 
 
 def wholes(system: System, number: int = 0) -> Iterator[PoseSystem]:
-    """The choices of legs with just as many equations as freedoms, then those with too many."""
+    """Yield the choices of legs with just as many equations as dof, then those with too many."""
     chart = system.chart(number)
     for size in range(1, len(system.curves) + 1):
         for legs in combinations(range(len(system.curves)), size):
@@ -60,7 +60,7 @@ def wholes(system: System, number: int = 0) -> Iterator[PoseSystem]:
 def propose_roots(part: PoseSystem, enough: int | None) -> Proposed | None:
     """All solutions, up to rounding, ``enough`` at most; None where there seem to be infinitely many.
 
-    Raises ``MissingExtra``, ``Unsolved`` where msolve is needed."""
+    Raises ``MissingExtra``, ``SystemNotSolved`` where msolve is needed."""
     return by_msolve(part) if part.chart.study is None else by_homotopy(part, enough)
 
 
@@ -82,7 +82,7 @@ def by_homotopy(part: PoseSystem, enough: int | None) -> Proposed:
 
 
 def _resting(part: PoseSystem) -> tuple[int, ...]:
-    """The places of the three equations of a tip at rest among all; none where there is none."""
+    """Return the indices of the three equations of a fixed tip; none if there is none."""
     counts = [3 - part.chart.reaches[k].freedoms for k in part.legs]
     first = next((k for k, leg in enumerate(part.legs) if isinstance(part.chart.reaches[leg], Point)), None)
     if first is None or sum(counts) != part.chart.count - len(part.chart.own):
@@ -94,7 +94,7 @@ def _resting(part: PoseSystem) -> tuple[int, ...]:
 def by_msolve(part: PoseSystem) -> Proposed | None:
     """All solutions, distinct ones once; None where they are infinitely many.
 
-    Raises ``MissingExtra``, ``Unsolved``."""
+    Raises ``MissingExtra``, ``SystemNotSolved``."""
     equations, nonzero = part.equations(), part.chart.nonzero
     answer = parametrise(equations)
     if answer is None and nonzero is not None:
@@ -110,7 +110,7 @@ def by_msolve(part: PoseSystem) -> Proposed | None:
 def enclose_roots(
     part: PoseSystem, proposed: Proposed, most: Bound | None = None, balls: Within = Balls, farthest: float = FARTHEST
 ) -> SolutionSet:
-    """What is proposed for a choice of legs, as :func:`solve_square` gives it; where a degree bounds their number,
+    """Return the proposals for a choice of legs, as :func:`solve_square` gives it; if a degree bounds their number,
     solutions at infinity are counted too."""
     from flint import ctx
 
@@ -138,7 +138,7 @@ def enclose_roots(
 
 @dataclass(frozen=True, eq=False)
 class _Tips(Enclosing):
-    """Solutions in the pose's own coordinates, told by where the legs' tips are."""
+    """Solutions in the pose's own coordinates, identified by the positions of the legs' tips."""
 
     chart: PoseParametrization
     method = ""
@@ -175,8 +175,8 @@ class _Tips(Enclosing):
 
 
 def _far_apart(part: PoseSystem, far: Sequence[Sequence[Any]]) -> bool:
-    """Whether solutions of the rounded equations beyond ``FARTHEST`` are enclosed, each unknown in its own size, no two
-    in one box."""
+    """Return True if solutions of the rounded equations beyond ``FARTHEST`` are enclosed, each unknown in its own size,
+    no two in one box."""
     from flint import ctx
 
     boxes, quadrics = list[list[Any]](), combine_quadrics(part.equations())
@@ -200,8 +200,8 @@ def _far_apart(part: PoseSystem, far: Sequence[Sequence[Any]]) -> bool:
 def _apart(
     chart: PoseParametrization, thick: Sequence[Any], real: Sequence[Sequence[Any]], values: Sequence[Sequence[Any]]
 ) -> bool:
-    """Whether all solutions, ``real`` ones in their boxes already, have boxes with one pose each, and no two the same;
-    complex ones with their conjugates, so that none is real."""
+    """Return True if all solutions, ``real`` ones in their boxes already, have boxes with one pose each, and no two the
+    same; complex ones with their conjugates, so that none is real."""
     boxes = list(real)
     upper = [each for each in values if next(float(v.imag) for v in each if not v.imag.is_zero()) > 0]
     for start in upper:
@@ -220,7 +220,8 @@ def _apart(
 
 
 def _is_pose(chart: PoseParametrization, box: Sequence[Any]) -> bool:
-    """Whether all of a box are poses, of a rigid body nearer than ``FARTHEST``: |e|² below so many times |e·e|."""
+    """Return True if all of a box are poses, of a rigid body nearer than ``FARTHEST``: |e|² below so many times
+    |e·e|."""
     if chart.nonzero is None:
         return True
     ends, least = np.array([1, *box], dtype=object), float(chart.nonzero.value(box).abs_lower())
@@ -230,7 +231,7 @@ def _is_pose(chart: PoseParametrization, box: Sequence[Any]) -> bool:
 
 
 def _over(answer: Parametrisation, nonzero: Quadric | None, t: Any, multiplicity: int) -> list[Solution]:
-    """The solution over a root; none where it is not finite or it cannot be told whether it is a pose."""
+    """Return the solution over a root; none if it is not finite or not known to be a pose."""
     values = answer.others(t)
     if not all(sharp(v) for v in values):
         return []
@@ -239,7 +240,7 @@ def _over(answer: Parametrisation, nonzero: Quadric | None, t: Any, multiplicity
 
 
 def _no_pose(nonzero: Quadric | None, values: Sequence[Any]) -> bool:
-    """Whether what vanishes at no pose vanishes, to ``BALL_ZERO``, at complex coordinates."""
+    """Return True if ``nonzero`` vanishes, to ``BALL_ZERO``, at complex coordinates."""
     from flint import ctx
 
     with ctx.workprec(PRECISION << PRECISIONS):

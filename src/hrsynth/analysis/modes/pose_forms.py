@@ -60,12 +60,12 @@ class Poses:
 
     @classmethod
     def planar(cls, n: Array) -> Poses:
-        """Those in a plane with a normal."""
+        """Poses in a plane with a normal."""
         return cls(np.array([[1.0, 0.0], *([0.0, v] for v in n)]), np.column_stack([*plane_axes(n)]))
 
     @classmethod
     def translating(cls) -> Poses:
-        """Those that are turned as the goal."""
+        """Poses with the rotation of the goal."""
         return cls(np.eye(4, 1), np.eye(3))
 
     @property
@@ -75,11 +75,11 @@ class Poses:
 
     @property
     def freedoms(self) -> int:
-        """How many they have."""
+        """Number of dof."""
         return int(self.turns.shape[1] - 1 + self.moves.shape[1])
 
     def rates(self, condition: PoseCondition) -> Array:
-        """The derivative of a condition at the goal by the freedoms; shape (freedoms,)."""
+        """Return the derivative of a condition at the goal by the dof; shape (dof,)."""
         along, turned = condition.slopes(condition.b, condition.c, np.asarray)
         moment = cross(condition.b, along) + cross(condition.c, turned)
         return np.hstack([along @ self.moves, moment @ self.turns[1:, 1:]])
@@ -92,8 +92,8 @@ class Poses:
 
 @dataclass(frozen=True, eq=False)
 class SquareForms:
-    """As many conditions as poses have freedoms: ``planes`` that give p, but for m coordinates along ``free`` (k, m),
-    and the ``others``."""
+    """As many conditions as poses have dof: ``planes`` that give p, but for m coordinates along ``free`` (k, m), and
+    the ``others``."""
 
     poses: Poses
     planes: tuple[OnPlane, ...]
@@ -134,12 +134,12 @@ class SquareForms:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """How many coordinates of degree one and of degree two there are."""
+        """Number of coordinates of degree one and of degree two."""
         return self.poses.turns.shape[1], self.free.shape[1]
 
     @property
     def most(self) -> int:
-        """How many isolated zeros there are at most."""
+        """Bound of the isolated zeros."""
         return int(prod(self.degrees)) // 2 ** self.shape[1]
 
     @property
@@ -152,12 +152,12 @@ class SquareForms:
 
     @property
     def size(self) -> int:
-        """How many forms there are of that degree."""
+        """Number of forms of that degree."""
         return len(exponents(self.shape, self.degree))
 
     @cached_property
     def system(self) -> Array:
-        """What gives z from the heights of the planes and s; shape (k, k)."""
+        """Map from the heights of the planes and s to z; shape (k, k)."""
         return np.vstack([*(c.n @ self.poses.moves for c in self.planes), self.free.T])
 
     def position(self, R: Array, s: Array) -> Array:
@@ -210,9 +210,9 @@ def _times(shape: tuple[int, int], t: int, count: int, what: str) -> Array:
 
 
 def proposals(forms: SquareForms, t: int, number: int, k: int) -> tuple[Array, Array] | None:
-    """All poses to rounding, from the forms of degree t, ``number`` of them on the multiples of wᵏ: coordinates y
-    (n, a), of unit quaternions, complex, and positions (n, 3); None where they are not told apart, or where there are
-    more functionals than isolated zeros could span: some zeros are not isolated, and then these are fewer."""
+    """Return all poses to rounding, from the forms of degree t, ``number`` of them on the multiples of wᵏ: coordinates
+    y (n, a), of unit quaternions, complex, and positions (n, 3); None if they are not separated, or if there are more
+    functionals than isolated zeros could span: some zeros are not isolated, and then these are fewer."""
     from scipy.linalg import lstsq, qr
 
     shape = forms.shape

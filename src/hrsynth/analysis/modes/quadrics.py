@@ -245,7 +245,7 @@ class PoseSystem:
     """One choice of legs with as many equations as unknowns, the pose's own coordinates.
 
     Equations of the last leg that are too many are replaced by as many random combinations of them as are needed;
-    ``whole`` says that no other equation is left.
+    ``whole``: no other equation is left.
     """
 
     legs: tuple[int, ...]

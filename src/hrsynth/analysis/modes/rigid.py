@@ -61,9 +61,9 @@ class Planar(System):
                 else 0.0
             )
             if off > SAME_DIRECTION:
-                raise BadRequest("a curve outside the plane of motion, sine", off, f"at most {SAME_DIRECTION}")
+                raise BadRequest("sine of a locus's angle with the plane of motion", off, f"at most {SAME_DIRECTION}")
         if self.surfaces:
-            raise BadRequest("what tips in a plane are confined to", "a surface", "points, lines and circles")
+            raise BadRequest("the loci of tips in a plane", "a surface", "points, lines and circles")
 
     def position(self, origin: Array) -> Array:
         """The coordinates (2,) of a platform whose origin is at a point (3,)."""
@@ -75,7 +75,7 @@ class Planar(System):
         return np.asarray(self.X_plane @ np.array([[c, -s, 0, q[0]], [s, c, 0, q[1]], [0, 0, 1, 0], [0, 0, 0, 1]]))
 
     def tips_at(self, q: Array) -> Array:
-        """Where the tips are at a pose, each in the plane of its own curve; shape (legs, 3), metres."""
+        """Return the positions of the tips at a pose, each in the plane of its own curve; shape (legs, 3), metres."""
         X, n = self.pose(q), self.X_plane[:3, 2]
         found = []
         for curve, tip in zip(self.curves, self.tips, strict=True):
@@ -84,7 +84,7 @@ class Planar(System):
         return np.array(found)
 
     def spread(self, q: Array, apart: Mapping[int, float]) -> tuple[float, float]:
-        """How far the platform's frame (m) and turn (rad) can be from those at q; see ``registered``."""
+        """Return how far the platform's frame (m) and rotation (rad) can be from those at q; see ``registered``."""
         return register(self.tips, apart)
 
     @cached_property
@@ -214,13 +214,13 @@ class Spatial(System):
         return pose(q[:3], exponential(q[3:]))
 
     def tips_at(self, q: Array) -> Array:
-        """Where the tips are at a pose; shape (legs, 3), metres."""
+        """Return the positions of the tips at a pose; shape (legs, 3), metres."""
         X = self.pose(q)
         at = self.tips @ X[:3, :3].T
         return np.vstack([X[:3, 3] + at[: len(self.points)], self.hub + at[len(self.points) :]])
 
     def spread(self, q: Array, apart: Mapping[int, float]) -> tuple[float, float]:
-        """How far the platform's frame (m) and turn (rad) can be from those at q; see ``registered``."""
+        """Return how far the platform's frame (m) and rotation (rad) can be from those at q; see ``registered``."""
         return register(self.tips, apart, self.arrows)
 
     def chart(self, number: int) -> PoseParametrization:
@@ -228,7 +228,7 @@ class Spatial(System):
         return study(self.curves, self.tips, self.size, number, self.arrows, self.hub)
 
     def squares(self) -> Iterator[SquareSystem]:
-        """Three tips at rest; two, one or none and as many curves as make three, with tips not on one line."""
+        """Yield three fixed tips; two, one or none and as many curves as make three, with tips not on one line."""
         points = [k for k, curve in enumerate(self.curves) if isinstance(curve, Point)]
         moving = [k for k in curves_of(self.curves) if k not in points]
         choices = list(combinations(points, 3)) + [(i, j, k) for j, k in combinations(points, 2) for i in moving]
@@ -239,7 +239,8 @@ class Spatial(System):
                 yield self._square(legs, len(moving) == len(self.curves) == 3)
 
     def _square(self, legs: tuple[int, ...], whole: bool) -> SquareSystem:
-        """Three distances between three tips; with tips at rest, given last, those that decide the others."""
+        """Return the system of three distances between three tips; with fixed tips, given last, those that determine
+        the others."""
         curves = tuple(curve for k in legs if not isinstance(curve := self.curves[k], Surface))
         b = self.tips[list(legs)]
         unknowns = tuple(curve for curve in curves if not isinstance(curve, Point))

@@ -29,7 +29,7 @@ PRECISION = 128
 """Bits with which roots are isolated first."""
 
 PRECISIONS = 4
-"""How often the precision is doubled before another unknown is kept."""
+"""Number of times that the precision is doubled before another unknown is kept."""
 
 STARTS = (0.0, 1.1, -0.9)
 """Origins of the angles (rad) that are tried until none of the solutions lies at t = ∞."""
@@ -67,7 +67,7 @@ class SolutionSet:
     """All solutions of a square system; ``complex`` counts them with multiplicity.
 
     ``degree`` is that of the polynomial that was isolated, ``extraneous`` how many roots of it lie at infinity.
-    ``continuum`` says that all such polynomials vanish, ``closest`` is the smallest distance between two solutions.
+    ``continuum``: all such polynomials vanish; ``closest``: the smallest distance between two solutions.
     """
 
     complex: int = 0
@@ -81,17 +81,17 @@ class SolutionSet:
     far: int = 0
     """Solutions at infinity but for rounding, which ``complex`` does not count."""
     undecided: bool = False
-    """Whether it is not clear which are."""
+    """True if it is not clear which these are."""
     apart: bool = False
-    """Whether each complex solution is enclosed, apart from all others, for all input in the balls."""
+    """True if each complex solution is enclosed, apart from all others, for all input in the balls."""
     beyond: int = 0
-    """How many solutions at infinity are enclosed, apart from each other."""
+    """Number of enclosed, distinct solutions at infinity."""
     values: tuple[Sequence[Any], ...] = ()
     """Balls of the unknowns of all."""
     distant: tuple[Sequence[Any], ...] = ()
-    """The same of the ``far`` ones."""
+    """Balls of the unknowns of the ``far`` ones."""
     turn: float = 0.0
-    """Where circles are counted from (rad), besides each unknown's own origin."""
+    """Origin of the angles of circles (rad), besides each unknown's own origin."""
 
 
 def solve_square(square: SquareSystem, balls: Within = Balls, farthest: float = FARTHEST) -> SolutionSet:
@@ -155,7 +155,7 @@ def _spread(ball: Any) -> float:
 
 
 def _vanishes(polynomial: fmpz_poly, noisy: fmpz_poly) -> bool:
-    """Whether a resultant is zero, or of the size of what rounding makes of zero."""
+    """Return True if a resultant is zero, or of the size that rounding gives zero."""
     return not polynomial or height(polynomial - noisy) * LOUD > height(polynomial)
 
 
@@ -202,8 +202,8 @@ def all_solutions(polynomial: fmpz_poly, over: Callable[[Any, int], list[Solutio
 def _over(
     x: Any, multiplicity: int, order: tuple[int, ...], eliminant: Eliminant, half_angles: Sequence[bool]
 ) -> list[Solution]:
-    """The solutions over a root, each with its multiplicity; none where they cannot be told from infinity or from each
-    other."""
+    """Return the solutions over a root, each with its multiplicity; none if they cannot be separated from infinity or
+    from each other."""
     one = _restore_order(order, (x, *eliminant.others(x)))
     if _finite(one, half_angles):
         return [(one, multiplicity)]
@@ -228,34 +228,36 @@ def _restore_order(order: tuple[int, ...], values: Sequence[Any]) -> list[Any]:
 
 
 def _finite(values: Sequence[Any], half_angles: Sequence[bool]) -> bool:
-    """Whether all values are finite and known well, and none a half-angle tangent at which a circle is at infinity."""
+    """Return True if all values are finite and known well, and none a half-angle tangent at which a circle is at
+    infinity."""
     return all(sharp(v) and not (half and (1 + v * v).contains(0)) for v, half in zip(values, half_angles, strict=True))
 
 
 def sharp(value: Any) -> bool:
-    """Whether a ball is so small that solutions on both sides of a denominator's zero are told apart."""
+    """Return True if a ball is so small that it separates solutions on both sides of a denominator's zero."""
     return bool(value.is_finite()) and float(value.rad()) <= SHARP_ROOT * (1.0 + float(abs(value.mid())))
 
 
 def is_real(values: Sequence[Any]) -> bool:
-    """Whether a solution is real: it is where the root is and the other unknowns are rational in it or roots of it."""
+    """Return True if a solution is real: it is where the root is and the other unknowns are rational in it or roots of
+    it."""
     return all(v.imag.is_zero() for v in values)
 
 
 def off_real(values: Sequence[Any]) -> float:
-    """How far a solution is from real ones, relative to its unknowns."""
+    """Return the distance of a solution from real ones, relative to its unknowns."""
     return max(abs(float(v.imag)) / (1.0 + abs(float(v.real))) for v in values)
 
 
 def _almost_real(values: Sequence[Any]) -> bool:
-    """Whether a solution is the first of a conjugate pair that nearly is one real solution."""
+    """Return True if a solution is the first of a conjugate pair that nearly is one real solution."""
     first = next((float(v.imag) for v in values if not v.imag.is_zero()), 0.0)
     return off_real(values) < NEARLY_DOUBLE / 2 and first > 0
 
 
 @dataclass(frozen=True, eq=False)
 class Enclosing(ABC):
-    """What encloses the solutions of a choice of legs: its equations, of the rounded input and of the exact one."""
+    """Enclosures of the solutions of a choice of legs: its equations, of the rounded input and of the exact one."""
 
     balls: Within
     equations: Sequence[Polynomial]
@@ -264,15 +266,15 @@ class Enclosing(ABC):
 
     @abstractmethod
     def distance(self, values: Sequence[Any]) -> float:
-        """How far away the points of a solution are, complex ones too (sizes)."""
+        """Return the distance of the points of a solution, complex ones too (sizes)."""
 
     @abstractmethod
     def parameters(self, values: Sequence[Any]) -> tuple[Any, ...]:
-        """Balls of what a root tells, for balls of the unknowns."""
+        """Return balls of the values at a root, for balls of the unknowns."""
 
     @abstractmethod
     def misses(self, own: Sequence[Any], values: Sequence[Any]) -> tuple[float, ...]:
-        """How far the points at balls of the parameters ``own`` and of the unknowns are from those at the middle
+        """Return how far the points at balls of the parameters ``own`` and of the unknowns are from those at the middle
         (m)."""
 
     def all_of(self, solutions: Sequence[Solution], degree: int, farthest: float) -> SolutionSet:
@@ -329,7 +331,7 @@ class _Enclosing(Enclosing):
     method = "exact resultant"
 
     def complex_for_all(self, values: Sequence[Any]) -> bool:
-        """Whether a complex solution is proved to be no real one for all input in the balls."""
+        """Return True if a complex solution is proved to be no real one for all input in the balls."""
         box = krawczyk(self.thick, values)
         return box is not None and any(not v.imag.contains(0) for v in box)
 
@@ -341,7 +343,8 @@ class _Enclosing(Enclosing):
 
     @cached_property
     def _radii(self) -> list[list[float]]:
-        """Of each unknown's curve how far the exact coefficients of t⁰, t¹, t² can be from the rounded ones (m)."""
+        """Return, for each unknown's curve, how far the exact coefficients of t⁰, t¹, t² can be from the rounded ones
+        (m)."""
         return [
             [
                 math.hypot(*(float(each.rad()) for each in row if not isinstance(each, int))) * self.frame.size / UNIT
@@ -411,5 +414,5 @@ def _closest(solutions: Sequence[Sequence[Any]]) -> float:
 
 
 def nearly_double(roots: SolutionSet) -> bool:
-    """Whether two solutions coincide, or nearly: the pose is singular."""
+    """Return True if two solutions coincide, or nearly: the pose is singular."""
     return roots.closest < NEARLY_DOUBLE or any(root.multiplicity > 1 for root in roots.real)

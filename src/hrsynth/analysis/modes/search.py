@@ -1,7 +1,7 @@
-"""Modes of any closed loop by search: the whole robot is closed from random starts with its measurements held.
+"""Modes of any closed loop by search: the whole robot is closed from random starts with its measured values fixed.
 
 Nothing is assumed of the legs, so every robot has an answer; and nothing is proved: what is listed was found, and there
-may be more. How often each mode was met tells how well the search has covered them.
+may be more. The number of hits of each mode shows how well the search has covered them.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from .self_motions import SelfMotion, bodies_apart, self_motion
 
 @dataclass(frozen=True, eq=False)
 class FoundMode:
-    """A closing of the whole robot with the measurements of the goal: the configuration, the poses (4, 4) of the
-    platform's bodies, what is left of loops and measurements, and from how many starts that pose was met."""
+    """Closed configuration of the whole robot with the measured values of the goal, the poses (4, 4) of the platform's
+    bodies, the residual of loops and values, and the number of starts that led to that pose."""
 
     configuration: ClosedConfiguration
     bodies: dict[str, Array]
@@ -37,9 +37,9 @@ class FoundMode:
 
 @dataclass(frozen=True, eq=False)
 class ModeSearch:
-    """What random starts found: modes at which the measurements decide the pose, the goal first where it is one;
-    ``motions`` along which the robot moves with the measurements at rest; how many of the ``starts`` ``closed``, and
-    how many of those ended elsewhere where the measurements leave the platform a freedom (``loose``)."""
+    """Modes found from random starts, at which the measured values determine the pose, the goal first if it is one;
+    ``motions``: self-motions; how many of the ``starts`` ``closed``, and how many of those ended elsewhere where the
+    values leave the platform a dof (``loose``)."""
 
     modes: tuple[FoundMode, ...]
     self_motions: tuple[SelfMotion, ...]
@@ -47,25 +47,25 @@ class ModeSearch:
     closed: int
     loose: int
     near: tuple[FoundMode, ...] = ()
-    """Closings at which the measurements are nearly those of the goal, each pose once."""
+    """Closed configurations with nearly the measured values of the goal, each pose once."""
 
     @property
     def words(self) -> str:
-        """What was done, and how well it covers."""
+        """Description of the search, and how well it covers the modes."""
         once = sum(mode.met == 1 for mode in self.modes[0 if any(motion.goal for motion in self.self_motions) else 1 :])
-        rare = "" if not once else f"; {once} of the modes {'was' if once == 1 else 'were'} met only once"
+        rare = f"; {once} of the modes {'was' if once == 1 else 'were'} found only once" if once else ""
         moving = sum(motion.hits for motion in self.self_motions)
         on = f", {moving} of them on self-motions" if moving else ""
         return f"found from {self.starts} random starts of the whole robot, of which {self.closed} closed{on}{rare}"
 
     @property
     def degenerate(self) -> str | None:
-        """What is special: closings at which the platform is free to move to first order."""
+        """Closed configurations at which the platform can move to first order, as text."""
         if not self.loose:
             return None
         return (
-            f"{self.loose} starts ended at poses, not listed, at which the measurements leave the platform a "
-            "freedom, and from which no self-motion was followed: singular poses"
+            f"{self.loose} starts ended at poses, not listed, at which the measured values leave the platform a "
+            "dof, and from which no self-motion was followed: singular poses"
         )
 
 
@@ -87,7 +87,7 @@ def search(goal: ClosedConfiguration, observation_model: ObservationModel, bodie
         start = model.integrate(model.q0, rng.uniform(-far, far, model.nv))
         try:
             q, residual = solve(model, start, held, tolerance=SOLVED, iterations=SEARCH_ITERATIONS)
-        except UndefinedValue:  # on the way a point came to a camera's centre
+        except UndefinedValue:  # along the path a point came to a camera's centre
             continue
         if residual > CLOSED:
             if residual <= NEAR_MODE:
@@ -147,8 +147,8 @@ def _add_near(
 
 
 def leaves_free(at: ClosedConfiguration, observation_model: ObservationModel) -> bool:
-    """Whether the measurements leave the platform a freedom, to first order or nearly: then closings to rounding lie
-    about one that are none."""
+    """Return True if the measured values leave the platform a dof, to first order or nearly: then rounding makes closed
+    configurations about one that is not."""
     there = relation(at, observation_model)
     return there.rank < there.dof.value or there.seen.weakest < SURELY_SOMETHING
 

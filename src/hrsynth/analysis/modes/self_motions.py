@@ -1,8 +1,8 @@
-"""Self-motions: curves of modes, along which the robot moves with all that is measured at rest.
+"""Self-motions: curves of modes, along which the robot moves with constant measured values.
 
-At a closing where the measurements leave the platform a freedom to first order, the robot is led along it by steps that
-are closed again (predictor and corrector). Where it stays closed over a distance a self-motion is *found*; where it
-does not, the closing is a singular pose. Samples of a curve prove neither.
+Where the measured values leave the platform a dof to first order, the robot is led along it by steps that are closed
+again (predictor and corrector). If it stays closed over a distance a self-motion is *found*; if not, the pose is
+singular. Samples of a curve prove neither.
 """
 
 from __future__ import annotations
@@ -43,14 +43,13 @@ from ...tolerances import (
 
 @dataclass(frozen=True, eq=False)
 class SelfMotion(Record):
-    """A motion of the robot with the measurements at rest, as far as it was followed from one of its poses.
+    """Motion of the robot with constant measured values, as far as it was followed from one of its poses.
 
-    ``dimension``: in how many independent ways the platform's bodies were led to closings nearby; ``links``: those that
-    are elsewhere, or turned, on the way; ``shift`` (m) and ``turn`` (rad): how far the platform went; ``returns``:
-    whether it came back to where it began; ``goal``: whether it began at the pose from
-    which the measurements were taken; ``met``: how many starts of a search ended on it, as far as could be told;
-    ``beyond``: joints that are outside their limits somewhere on the way, and how far the platform went with all
-    within theirs (``inside``: m, rad).
+    ``dimension``: number of independent ways in which the platform's bodies were led to closed configurations nearby;
+    ``links``: those that move; ``shift`` (m) and ``turn`` (rad): how far the platform went; ``returns``: True if it
+    came back to its start; ``goal``: True if it began at the pose at which the values were measured; ``hits``: number
+    of starts of a search that ended on it; ``beyond_limits``: joints that are outside their limits somewhere along it;
+    ``inside`` (m, rad): how far the platform went with all joints within theirs.
     """
 
     configuration: ClosedConfiguration
@@ -63,16 +62,16 @@ class SelfMotion(Record):
     hits: Recorded[int] = 0
     way: tuple[dict[str, Array], ...] = field(default=(), repr=False)
     """The poses (4, 4) of the platform's bodies on the way."""
-    beyond_limits: Annotated[tuple[str, ...], "joints that are beyond their limits somewhere on the way"] = ()
+    beyond_limits: Annotated[tuple[str, ...], "joints that are beyond their limits somewhere along the motion"] = ()
     inside: tuple[float, float] = (0.0, 0.0)
 
     @cached_property
     def words(self) -> str:
-        """What moves, and how far it was followed; where limits end it."""
+        """Links that move, and how far it was followed; where joint limits end it."""
         mechanism = self.configuration.model.mechanism
         resting = [link for link in mechanism.links if link not in self.links and link != mechanism.base]
         moving = ", ".join(self.links) if resting else "all links"
-        far = _far(self.shift, self.turn) + (", until it came back" if self.returns else "")
+        far = _far(self.shift, self.turn) + (", until it closed" if self.returns else "")
         ends = (
             ""
             if not self.beyond_limits
@@ -85,12 +84,13 @@ class SelfMotion(Record):
         return f"of dimension {self.dimension}, which moves {moving} (followed over {far}{ends})"
 
     def passes(self, at: ClosedConfiguration, observation_model: ObservationModel) -> bool:
-        """Whether it was followed by where the platform's bodies are at a closing, to a step."""
+        """Return True if it was followed to where the platform's bodies are at a closed configuration, to a step."""
         poses = {body: at.pose(body) for body in self.way[0]}
         return any(bodies_apart(poses, each, observation_model, at.model.length) <= MOTION_STEP for each in self.way)
 
     def like(self, dimension: int, links: Sequence[str]) -> bool:
-        """Whether a closing where these links can move in so many ways may lie on it, beyond where it was followed."""
+        """Return True if a closed configuration with these mobile links and this dimension may be on it, beyond where
+        it was followed."""
         return not (self.dimension == 1 and self.returns) and (self.dimension, self.links) == (dimension, tuple(links))
 
     within_m = Shown(
@@ -102,7 +102,7 @@ class SelfMotion(Record):
 
 
 def _far(shift: float, turn: float) -> str:
-    """A way of the platform (m, rad)."""
+    """Return a distance of the platform (m, rad) as text."""
     return " and ".join([f"{shift:.3g} m"] * (shift > 0) + [f"{turn:.3g} rad"] * (turn > 0))
 
 
@@ -114,8 +114,8 @@ def self_motion(
     *,
     goal: bool = False,
 ) -> SelfMotion | None:
-    """The motion through a closing with the measurements there held, one of those ``known`` where it may be that; None
-    where the platform's bodies cannot move even to first order, or where no step stays closed: a singular pose."""
+    """Return the self-motion through a closed configuration, one of those ``known`` if it may be that; None if the
+    platform's bodies cannot move even to first order, or if no step stays closed: a singular pose."""
     model = at.model
     held = FixedValuesTask.at(model, at.q, observation_model.reference, observation_model.observations)
     walker = _Follower(model, held, observation_model, tuple(dict.fromkeys((*bodies, observation_model.platform))))
@@ -149,8 +149,8 @@ def self_motion(
 def follow_motion(
     at: ClosedConfiguration, observation_model: ObservationModel, twist: Array, count: int
 ) -> tuple[tuple[ClosedConfiguration, ...], ...]:
-    """The motion with the measurements held that begins with a twist (rows of t; m, rad) of the platform, and with its
-    opposite: up to ``count`` closed configurations each way, none where the twist is one to first order only."""
+    """Return the self-motion that begins with a twist (rows of t; m, rad) of the platform, and with its opposite: up to
+    ``count`` closed configurations each way, none if the twist is one to first order only."""
     model = at.model
     walker = _Follower(
         model,
@@ -178,13 +178,13 @@ class _Followed:
 
     @property
     def far(self) -> float:
-        """How far the platform went, shift and turn together."""
+        """Distance of the platform's motion, shift and rotation together."""
         return self.shift + self.turn
 
 
 @dataclass(frozen=True, eq=False)
 class _Follower:
-    """Steps along motions of a robot with measurements held."""
+    """Steps along motions of a robot with fixed measured values."""
 
     model: PinocchioModel
     held: FixedValuesTask
@@ -196,9 +196,8 @@ class _Follower:
         return dict(zip(self.names, self.model.poses(q, self.names), strict=True))
 
     def tangents(self, q: Array, least: float = SURELY_SOMETHING) -> tuple[Array, Array]:
-        """The ways in which the bodies can move to first order, where singular values below ``least`` are zero: an
-        orthonormal basis of their twists, (rows, d), and joint velocities (nv, d), without idle ones, that make
-        them."""
+        """Return the twists of the bodies to first order, where singular values below ``least`` are zero: an
+        orthonormal basis, (rows, d), and joint velocities (nv, d), without internal ones, that make them."""
         _, values, right = np.linalg.svd(system(self.model, q, self.held)[1])
         kernel = right[int(np.sum(values > least * values.max(initial=1.0))) :].T
         X, V = self.model.frames(q, self.names)
@@ -214,8 +213,9 @@ class _Follower:
         return basis, np.asarray(kernel @ np.linalg.lstsq(moves, basis, rcond=INVERTED)[0])
 
     def around(self, q: Array) -> tuple[Array, list[Array]]:
-        """The ways in which closings lie about one: an orthonormal basis of the bodies' twists that lead to them
-        (rows, d), fewer than :meth:`tangents` where a freedom is one to first order only; and the closings."""
+        """Return the directions of closed configurations about one: an orthonormal basis of the bodies' twists that
+        lead to them (rows, d), fewer than :meth:`tangents` if a dof is one to first order only; and the
+        configurations."""
         basis, joints = self.tangents(q, MOTION_FREE)
         found, came, home, rng = [], [], self.bodies(q), np.random.default_rng(0)
         size = basis.shape[1]
@@ -348,8 +348,8 @@ class _Follower:
 def bodies_apart(
     one: dict[str, Array], other: dict[str, Array], observation_model: ObservationModel, length: float
 ) -> float:
-    """How far bodies are from where they are elsewhere, as :func:`pose_difference`; of a platform that is a point, the
-    point."""
+    """Return how far bodies are from where they are elsewhere, as :func:`pose_difference`; of a platform that is a
+    point, the point."""
     return max(
         pose_difference(X, other[body], length, observation_model.point if body == observation_model.platform else None)
         for body, X in one.items()

@@ -4,7 +4,7 @@ section 8).
 In dual quaternions a joint is c + s h, h that of its axis. The loop is g₃ g₄ g₅ = λ (g₁ g₂)⁻¹ with c₁ c₂, s₁ c₂, c₁ s₂,
 s₁ s₂ and those of g₄, g₅ as unknowns (M. L. Husty, M. Pfurner and H.-P. Schröcker, Mech. Mach. Theory 42, 2007): eight
 linear equations in eight unknowns, whose determinant is of degree four in s₃ / c₃. That the unknowns are such products
-is asked besides.
+is checked besides.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from .solve import SystemMode, SystemModes
 
 LARGEST_CHAIN = 5
 TURN = 0.7
-"""By what the joint in the middle is turned (rad), so that none of its angles of interest is a half-turn."""
+"""Rotation of the middle joint (rad), so that none of its angles of interest is a half-turn."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -53,7 +53,7 @@ class SingleLoop(CarriedPlatform):
 
     @property
     def carrying(self) -> int:
-        """How many of the joints carry the platform."""
+        """Number of joints that carry the platform."""
         return self.before
 
     def close(self, q: Array) -> tuple[ClosedConfiguration, float]:
@@ -115,7 +115,7 @@ def single_loop(measured: MeasuredRobot, goal: ClosedConfiguration, error: float
         or measured.setup.decomposition.point is not None
         or any(ends.count(link) != 2 for link in mechanism.links)
     ):
-        raise UnsupportedLocus(mechanism.name, "it is not one loop, of which the platform is a body")
+        raise UnsupportedLocus(mechanism.name, "it is not one loop that contains the platform")
     middle = OriginAndUnit(goal.pose(bodies[0])[:3, 3], goal.model.length)
     held = [each.joint for each in seen if isinstance(each, Encoder)]
     way, at, left = list[tuple[list[_Place], str]](), mechanism.base, list(mechanism.joints.values())
@@ -141,7 +141,7 @@ def single_loop(measured: MeasuredRobot, goal: ClosedConfiguration, error: float
             not isinstance(each, Direction)
             or (each.seen_from or measured.observation_model.reference) != mechanism.base
         ):
-            raise UnsupportedLocus(mechanism.name, "what is measured is not a direction seen from the base")
+            raise UnsupportedLocus(mechanism.name, "an observation is not a direction from the base")
         k = [link for _, link in way].index(each.link) + 1
         d = goal.pose(each.link)[:3, :3] @ each.direction
         for side in (way[:k], way[k:]):
@@ -153,7 +153,7 @@ def single_loop(measured: MeasuredRobot, goal: ClosedConfiguration, error: float
                     part[:] = [one for one in part if one is not turning[0]]
                 break
         else:
-            raise UnsupportedLocus(mechanism.name, f"what is measured at {each.link} holds no joint")
+            raise UnsupportedLocus(mechanism.name, f"the observation at {each.link} locks no joint")
     k = [link for _, link in way].index(bodies[0]) + 1
     chain = [one for part, _ in way for one in part]
     if not 0 < len(chain) <= LARGEST_CHAIN:
@@ -188,7 +188,7 @@ class _Linear:
         return [(self.first + k) % n for k in range(n)]
 
     def columns(self) -> tuple[list[Any], list[Any], Any]:
-        """Of the first two, conjugate, of the last, and the axis in the middle."""
+        """Factors of the first two, conjugate, of the last, and the axis in the middle."""
         h = [self.loop.axes()[k] for k in self.order]
         one = np.array([1, 0, 0, 0, 0, 0, 0, 0], dtype=object)
         two, rest = h[:2], h[2 + (len(h) == LARGEST_CHAIN) :]
@@ -213,7 +213,7 @@ class _Linear:
 
 
 def _regular(rows: Any) -> bool:
-    """Whether columns are independent for all numbers in their balls."""
+    """Return True if columns are independent for all numbers in their balls."""
     from flint import arb_mat
     from scipy.linalg import qr
 
@@ -257,7 +257,7 @@ def _determinant(linear: _Linear) -> list[Any]:
 
 
 def _products(linear: _Linear, t: Any) -> Any:
-    """The unknowns (8,) at a zero, the last joints' first, in balls; None where they are not told."""
+    """Return the unknowns (8,) at a zero, the last joints' first, in balls; None if they are not determined."""
     from flint import arb, arb_mat
     from scipy.linalg import qr
 
@@ -287,11 +287,13 @@ def _halves(x: Any) -> list[tuple[Any, Any]]:
 
 
 def solve_loop(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0) -> tuple[Model, SystemModes]:
-    """All modes, with the goal known to ``error`` (m). Raises ``UnsupportedLocus`` and ``Unsolved``."""
+    """All modes, with the goal known to ``error`` (m). Raises ``UnsupportedLocus`` and ``SystemNotSolved``."""
     from flint import ctx
 
     if not np.isfinite(error):
-        raise UnsupportedLocus(measured.setup.robot.name, "no distance bounds how far it is from where its loops close")
+        raise UnsupportedLocus(
+            measured.setup.robot.name, "the distance to the exact closed configuration is not bounded"
+        )
     loop, (body,) = single_loop(measured, goal, error), leg_ends(measured.setup.decomposition)
     with ctx.workprec(PRECISION):
         found = _five(loop) if len(loop.freedoms_) == LARGEST_CHAIN else _few(loop)
@@ -321,24 +323,24 @@ def _few(loop: SingleLoop) -> SystemModes:
     box = _box(loop, [(arb(1), arb(0))] * n)
     assert box is not None
     proof = (
-        f"{n} free joint{'s' * (n > 1)} of one loop: at most one closing by the rank of linear equations in "
+        f"{n} free joint{'s' * (n > 1)} of one loop: at most one solution by the rank of linear equations in "
         "balls, which is the goal"
     )
     return SystemModes(1, (as_mode(loop, box, True, 0.0),), True, proof, bound="rank", enclosed=True)
 
 
 def _five(loop: SingleLoop) -> SystemModes:
-    """Five joints: zeros of a determinant in one of them, that which tells most."""
+    """List five joints: zeros of a determinant in one of them, that which separates most."""
     found = [each for first in range(LARGEST_CHAIN) if (each := _zeros(_Linear(loop, first))) is not None]
     if not found:
         raise SystemNotSolved(
-            "the loop", f"{LARGEST_CHAIN} free joints: a determinant does not distinguish its closings"
+            "the loop", f"{LARGEST_CHAIN} free joints: a determinant does not distinguish its solutions"
         )
     return min(found, key=lambda each: (not each.complete, max(mode.radius for mode in each.modes)))
 
 
 def _zeros(linear: _Linear) -> SystemModes | None:
-    """The modes, where all zeros are told apart."""
+    """Return the modes, if all zeros are separated."""
     f = _determinant(linear)
     if f[-1].contains(0):
         return None
@@ -354,15 +356,16 @@ def _zeros(linear: _Linear) -> SystemModes | None:
     kept = [each for each in told if each is at_goal[0] or not each[1]]
     modes = [_mode(linear.loop, each[0], each is at_goal[0]) for each in kept]
     proof = (
-        f"{LARGEST_CHAIN} free joints of one loop: at most {len(sure)} closings by the degree of a determinant, "
-        f"{len(sure)} zeros enclosed apart from each other, complex ones too, {len(told)} real"
+        f"{LARGEST_CHAIN} free joints of one loop: at most {len(sure)} solutions by the degree of a determinant, "
+        f"{len(sure)} zeros enclosed, all distinct, complex ones too, {len(told)} real"
     )
     out = [as_mode(linear.loop, box, False) for box, excluded in told if (box, excluded) not in kept]
     return SystemModes.of_more(modes, out, proof, "class")
 
 
 def _box_of_joints(linear: _Linear, t: Any) -> tuple[PoseBox, bool] | None:
-    """The box of all joints at a real zero, and whether its unknowns are no products; None where they are not told."""
+    """Return the box of all joints at a real zero, and whether its unknowns are no products; None if they are not
+    determined."""
     x = _products(linear, t)
     if x is None:
         return None

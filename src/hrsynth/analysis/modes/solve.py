@@ -45,7 +45,7 @@ Part = SquareSystem | PoseSystem
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SystemMode(Value):
-    """A pose with the directions that are held.
+    """Pose with the fixed directions.
 
     The exact pose is within ``shift`` (m, the origins of all bodies) and ``turn`` (rad) of ``pose`` (4, 4), the
     platform's frame in the base frame; ``radius`` is the larger of the two, lengths in sizes. ``parameters`` are those
@@ -64,20 +64,20 @@ class SystemMode(Value):
     legs: tuple[int, ...] = ()
     multiplicity: int = 1
     proved: bool = False
-    """Whether there is exactly one mode within the radius, for all input within its error."""
+    """True if exactly one mode is within the radius, for all input within its error."""
     match_residual: bool = False
-    """Whether the radius encloses exactly one solution of the square part, and all legs fit there to ``residual``: that
+    """True if the radius encloses exactly one solution of the square part, and all legs fit there to ``residual``: that
     does not prove it to be a mode."""
     rounded: bool = False
-    """Whether that is proved for the rounded input alone; then the radius is for it alone too."""
+    """True if that is proved for the rounded input alone; then the radius is for it alone too."""
     near: bool = False
-    """Whether it matches almost only."""
+    """True if it is an unproved match."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SquareSolution(Value):
-    """A square part of a system with all its solutions; ``modes`` are its real ones, in the order of ``roots.real``,
-    and ``kept`` tells which of them are modes of the whole system."""
+    """Square part of a system with all its solutions; ``modes`` are its real ones, in the order of ``roots.real``,
+    and ``kept`` marks those that are modes of the whole system."""
 
     system: System
     part: Part
@@ -88,15 +88,15 @@ class SquareSolution(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SystemModes(Value):
-    """All modes: ``complex`` solutions counted with multiplicity (None where they are not known), the real ones as
-    ``modes``, and in words the proof.
+    """All modes: ``complex`` solutions counted with multiplicity (None if not known), the real ones as ``modes``, and
+    the proof as text.
 
-    Where more is observed than needed, ``complex`` counts only the modes. ``complete`` holds only if every complex
-    solution is isolated and every real one enclosed. ``near`` are poses that match almost (none unless more is observed
-    than needed); ``bound`` says by what there are no more: ``resultant``, ``class`` (the degrees of such systems),
-    ``rank`` (of multiples of the equations) or ``none``, where a solver's count is trusted; ``enclosed`` that each
-    solution that was counted has its enclosure; ``degenerate`` says what is special about the input: a continuum, of
-    dimension ``continuum``, a singular pose, tips on one line.
+    With redundant observation, ``complex`` counts only the modes. ``complete`` is True only if every complex solution
+    is isolated and every real one enclosed. ``near`` are poses that match almost (with redundant observation only);
+    ``bound`` names the root bound: ``resultant``, ``class`` (the degrees of such systems), ``rank`` (of multiples of
+    the equations) or ``none``, if a solver's count is trusted; ``enclosed``: each counted solution has its enclosure;
+    ``singular_solutions`` describes a special input: a continuous family, of dimension ``continuous_family``, a
+    singular pose, tips on one line.
     """
 
     complex: int | None
@@ -109,17 +109,17 @@ class SystemModes(Value):
     bound: str = "none"
     enclosed: bool = False
     snapped: tuple[SnappedPoints, ...] = ()
-    """What was made exact."""
+    """Joint centres that were snapped."""
     solved: tuple[SquareSolution, ...] = field(default=(), repr=False)
     """What was solved, one for each choice of the legs' branches, where the solutions of a square part are all: working
     material, which a copy or a pickle does not hold."""
     open: bool = False
-    """Whether no choice of legs has finitely many solutions, on some branches of the legs at least."""
+    """True if no choice of legs has finitely many solutions, for some leg solutions at least."""
 
     @classmethod
     def of_more(cls, modes: Sequence[SystemMode], out: Sequence[SystemMode], proof: str, bound: str) -> SystemModes:
-        """Where more is told than a square part needs, all of whose zeros are known: those of its real zeros that are
-        not excluded, as others are (``out``), by all that is told."""
+        """Return the modes of a square part with further conditions, all of whose zeros are known: its real zeros
+        without those that further conditions exclude (``out``)."""
         fitting = tuple(mode for mode in modes if mode.proved or mode.residual <= VANISHES)
         open_ = len(modes) - len(fitting)
         told = words(True, False, [mode.residual for mode in fitting if not mode.proved], len(out), open_)
@@ -141,12 +141,12 @@ class SystemModes(Value):
 
 
 def solve(system: System, *, near: bool = True, goal: Array | None = None) -> SystemModes:
-    """All modes of a system: the solutions of its first square part that is not degenerate at which all tips fit.
+    """List all modes of a system: the solutions of its first regular square part at which all tips fit.
 
-    Where more is observed than needed, the ``goal``, coordinates of a pose at which all tips fit by construction, is
+    With redundant observation the ``goal``, coordinates of a pose at which all tips fit by construction, is
     proved to be a mode; others are modes that fit if their residual is at most ``VANISHES`` and they are not excluded.
-    ``near`` are the poses with a residual up to ``NEAR_MODE`` where the sum of squares is stationary, found from
-    several square parts (unless ``near`` is false).
+    ``near`` are the poses with a residual up to ``NEAR_MODE`` where the sum of squares is stationary, from several
+    square parts (unless ``near`` is false).
     Where no square part decides the pose, tips on surfaces are left to a solver that proposes poses: a homotopy for
     a rigid body, else msolve (``MissingExtra`` where that is not installed).
     """
@@ -174,7 +174,7 @@ def solve_by_msolve(system: System, *, near: bool = True, goal: Array | None = N
     """All modes of a system in the pose's own coordinates, proposed by msolve and enclosed here.
 
     As :func:`solve`, but solutions that coincide are counted once, and near modes are looked for from the solutions of
-    one choice of legs alone. Raises ``MissingExtra``, ``Unsolved``.
+    one choice of legs alone. Raises ``MissingExtra``, ``SystemNotSolved``.
     """
     system, told = snap_centres(system)
     return replace(_propose(system, near, goal, lambda part, enough: by_msolve(part)), snapped=told)
@@ -206,12 +206,12 @@ def _propose(
 
 
 def _too_few(system: System) -> SystemModes:
-    return continuum(f"too few legs: a continuum of dimension {system.missing}", system.missing)
+    return continuum(f"too few legs: a continuous family of dimension {system.missing}", system.missing)
 
 
 def _undecided_modes(system: System, tried: bool, goal: Array | None, near: bool) -> SystemModes:
-    """What is said where no choice of legs has finitely many solutions: the goal, where it is given, is one. Poses of a
-    continuum are looked for where ``near`` ones are."""
+    """Return the result if no choice of legs has finitely many solutions: the goal, if it is given, is one. Poses of a
+    continuous family are sought if ``near`` ones are."""
     known = () if goal is None else (_by_construction(system, goal, ()),)
     if not tried:
         return SystemModes(
@@ -219,7 +219,7 @@ def _undecided_modes(system: System, tried: bool, goal: Array | None, near: bool
             known,
             False,
             "nothing proved",
-            singular_solutions="no choice of legs decides the pose: tips on one line, in one point, or at rest",
+            singular_solutions="no choice of legs determines the pose: tips on one line, in one point, or fixed",
             open=True,
         )
     if not near:
@@ -238,15 +238,17 @@ def _undecided_modes(system: System, tried: bool, goal: Array | None, near: bool
             known,
             False,
             "nothing proved",
-            singular_solutions="the equations depend on each other, but no continuum of poses was found",
+            singular_solutions="the equations depend on each other, but no continuous family of poses was found",
             open=True,
         )
-    return replace(continuum(f"the tips can move together: a continuum of dimension {size}", size), open=True)
+    return replace(continuum(f"the tips can move together: a continuous family of dimension {size}", size), open=True)
 
 
 def continuum(text: str, size: int) -> SystemModes:
-    """Modes that form a continuum of this dimension."""
-    return SystemModes(0, (), False, "a continuum is not counted", singular_solutions=text, continuous_family=size)
+    """Return modes that form a continuous family of this dimension."""
+    return SystemModes(
+        0, (), False, "a continuous family is not counted", singular_solutions=text, continuous_family=size
+    )
 
 
 def _judge(
@@ -295,7 +297,7 @@ def _judge(
     open_ = [mode for mode in left if mode is not at_goal and mode.residual > VANISHES]
     lost = goal is not None and not any(_same(system, mode.q, goal) for mode in left)
     if goal is not None and not any(_same(system, mode.q, goal) for mode in modes):
-        at_goal = _by_construction(system, goal, square.legs)  # its solution is known too roughly to fit
+        at_goal = _by_construction(system, goal, square.legs)  # its solution is known too roughly to match
         modes, open_ = (*modes, at_goal), [mode for mode in open_ if not _same(system, mode.q, goal)]
         enclosed = False
     near = () if others is None else _near(system, found, modes, others)
@@ -334,24 +336,24 @@ def _goal(system: System, roots: SolutionSet, found: Sequence[SystemMode], goal:
 
 
 def _same(system: System, q: Array, goal: Array) -> bool:
-    """Whether a pose is the goal, but for what poses of one relation may differ."""
+    """Return True if a pose is the goal, but for the differences of poses of one relation."""
     return float(np.abs(system.tips_at(q) - system.tips_at(goal)).max()) <= SAME_RELATION * system.size
 
 
 def _bound(system: System, part: PoseSystem, most: Bound | None, roots: SolutionSet) -> tuple[str, str]:
-    """By what there are no more solutions than a solver proposes, and the proof in words (proofs.md 8)."""
+    """Return the root bound beyond the solutions that a solver proposes, and the proof as text (proofs.md 8)."""
     proof = _proof(system, roots)
     known = f", {roots.beyond} enclosed at infinity" if roots.beyond else ""
     known += f", the {roots.far} far ones for the rounded geometry" if roots.far else ""
     count = roots.complex + roots.beyond + roots.far
     if most is not None and roots.apart and count == most.most:
         return "class", (
-            f"{proof}; the complex ones are enclosed too, apart from each other{known}, and there are at "
+            f"{proof}; the complex ones are enclosed too, all distinct{known}, and there are at "
             f"most {most.most}: {most.why}"
         )
     if roots.apart and part.chart.study is None and most_zeros(part.equations(), count) == count:
         return "rank", (
-            f"{proof}; the complex ones are enclosed too, apart from each other{known}, and there are no "
+            f"{proof}; the complex ones are enclosed too, all distinct{known}, and there are no "
             "more: ranks of multiples of the equations modulo a prime of 62 bits"
         )
     limit = "" if most is None else f"{known}, of at most {most.most}: {most.why}"
@@ -401,8 +403,8 @@ def _points(square: SquareSystem, root: RealSolution) -> list[tuple[Array, float
 
 
 def _torn(system: System, square: Part, root: RealSolution) -> bool:
-    """Whether the tips of a solution's legs are torn from a rigid platform; where none rests, the square part's
-    equations are that they are not."""
+    """Return True if the tips of a solution's legs do not fit a rigid platform; unless one is fixed, the square part's
+    equations exclude that."""
     return (
         isinstance(square, SquareSystem)
         and system.rigid
@@ -413,7 +415,7 @@ def _torn(system: System, square: Part, root: RealSolution) -> bool:
 
 
 def _sure(system: System, root: RealSolution) -> bool:
-    """Whether a root's enclosure is proved for all input within its error."""
+    """Return True if a root's enclosure is proved for all input within its error."""
     return bool(np.isfinite(system.error) and root.unique and root.thick)
 
 
@@ -423,12 +425,12 @@ def _nearly(system: System, q: Array) -> SystemMode:
 
 def _proof(system: System, roots: SolutionSet) -> str:
     if not roots.degree and roots.complex:
-        return "tips at rest, which leave one pose"
+        return "fixed tips, which leave one pose"
     text = f"{roots.method} of degree {roots.degree}"
     if roots.extraneous:
         text += f" (besides {roots.extraneous} roots at infinity, which are not poses)"
     if roots.far:
-        text += f" (besides {roots.far} beyond {FARTHEST:g} sizes: at infinity, up to rounding)"
+        text += f" (besides {roots.far} beyond {FARTHEST:g} characteristic lengths: at infinity, up to rounding)"
     text += f", {roots.complex} {'root' if roots.complex == 1 else 'roots'} isolated"
     if roots.real:
         thin = sum(root.unique and not root.thick for root in roots.real)
@@ -449,14 +451,13 @@ def _proof(system: System, roots: SolutionSet) -> str:
 def _special(roots: SolutionSet) -> str | None:
     if roots.undecided:
         return (
-            "solutions of all distances: which of them a special geometry that is meant would send to infinity is "
-            "not decided"
+            "the solutions of all distances are counted: undecided which of them a snapped geometry sends to infinity"
         )
     if not nearly_double(roots):
         return None
     if any(root.multiplicity > 1 for root in roots.real):
         return "a double solution: a singular pose"
     return (
-        f"two solutions only {roots.closest:.1e} apart (allowed for distinct poses: {NEARLY_DOUBLE:g}): "
+        f"two solutions differ by only {roots.closest:.1e} (limit for distinct poses: {NEARLY_DOUBLE:g}): "
         "a singular pose, to rounding"
     )

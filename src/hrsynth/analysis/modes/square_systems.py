@@ -14,7 +14,7 @@ from .polynomials import Equation
 from .quadrics import UNIT, Conic, Numbers, Rounded, WorkingFrame, conic, direction, on_plane, on_sphere, spatial_frame
 
 TURNS = (0.7, 1.9, 2.6)
-"""Where t = 0 lies on the circles of the first, second and third unknown (rad): nowhere special."""
+"""Origin t = 0 on the circles of the first, second and third unknown (rad): nowhere special."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,7 +22,7 @@ class SquareSystem:
     """One choice of legs with as many equations as unknowns.
 
     ``unknowns`` are the curves whose parameters are solved for; ``build`` gives the equations from their conics;
-    ``place`` turns parameters (n,) into the coordinates of the system's pose; ``whole`` says that no other equation is
+    ``place`` turns parameters (n,) into the coordinates of the system's pose; ``whole``: no other equation is
     left; ``exact`` gives the points that the unknowns stand for, where these are not those of the curves.
     """
 
@@ -44,12 +44,12 @@ class SquareSystem:
         return [] if self.frame is None else self.build(self.conics(turn, numbers), numbers)
 
     def turns(self, turn: float) -> list[float]:
-        """Where each unknown's circle is counted from (rad)."""
+        """Origins of the circles of each unknown (rad)."""
         return [each + turn for each in TURNS[: len(self.unknowns)]]
 
     @property
     def round(self) -> list[bool]:
-        """Which unknowns are half-angle tangents."""
+        """Unknowns that are half-angle tangents."""
         return [isinstance(curve, Circle) for curve in self.unknowns]
 
 
@@ -60,13 +60,13 @@ def single(quadratic: Any) -> Equation:
 
 
 def resting(legs: tuple[int, ...], q: Array, whole: bool) -> SquareSystem:
-    """A pose that a tip at rest decides: nothing to solve."""
+    """A pose that a fixed tip determines: nothing to solve."""
     return SquareSystem(legs, (), None, lambda conics, numbers: [], lambda parameters: q, whole)
 
 
 def three_surfaces(legs: Sequence[tuple[int, Surface]], whole: bool) -> tuple[float, SquareSystem]:
     """The points on the surfaces of three legs, and the sine of the angle between the two planes: where that vanishes
-    the surfaces have no point in common, or a continuum of them."""
+    the surfaces have no point in common, or a curve of them."""
     first, second, last = _sort_surfaces([surface for _, surface in legs])
     all_three = (first, second, last)
     frame = spatial_frame(all_three, extent(all_three, np.zeros((1, 3))))

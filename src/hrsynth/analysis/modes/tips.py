@@ -1,9 +1,9 @@
-"""Where the tips of a hidden robot can be while its directions are held, from the mechanism itself.
+"""Loci of the tips of a hidden robot with fixed directions, from the mechanism itself.
 
-Each leg's joints say it, all branches of it (:mod:`.reaches`). Where they do not by the known laws, the pattern of the
-held legs names the tangent of the tip's path, or the normal of the surface that it stays on; then the path or surface
-through the goal is written down and checked by moving the leg on its own along all of its freedoms: found, and not
-known to be all.
+They follow from each leg's joints, for all leg solutions (:mod:`.loci_from_joints`). If not by the known laws, the
+pattern of the locked legs gives the tangent of the tip's path, or the normal of the surface that it stays on; then the
+path or surface through the goal is checked by moving the leg on its own along all of its dof: found, and not known to
+be all.
 """
 
 from __future__ import annotations
@@ -38,19 +38,19 @@ from .loci_from_joints import reaches
 from .locked_chain import Chain, LocusNotDerived, chain
 
 MOVES = (-0.4, -0.15, 0.15, 0.4)
-"""How far a leg is moved along a freedom to check where its tip can be (characteristic lengths, radians)."""
+"""Distance that a leg is moved along a dof to check its tip's locus (characteristic lengths, radians)."""
 
 MIXED = 4
-"""Combinations of its freedoms along which a leg with several of them is moved besides."""
+"""Number of combinations of its dof along which a leg with several of them is moved too."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Tip(Value):
-    """The tip of a held leg: the body that carries it, where (3,) in the body's frame (m), and the curve or surface in
+    """Tip of a locked leg: the body that carries it, where (3,) in the body's frame (m), and the curve or surface in
     the base frame (m) on which it is at the goal.
 
-    ``others`` are those of the leg's other branches, each with what it makes of an error of the goal; ``doubt`` says
-    why there may be more, None where these are all.
+    ``others`` are those of other leg solutions, each with its gain of an error of the goal; ``doubt`` is the reason
+    why there may be more, None if these are all.
     """
 
     leg: str
@@ -60,20 +60,20 @@ class Tip(Value):
     others: tuple[tuple[Reach, float], ...] = ()
     doubt: str | None = None
     moved: float = 0.0
-    """How far what the leg's geometry was taken to be is from it (m)."""
+    """Distance that the leg's geometry was moved (m)."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class KeptAngle(Value):
     """A direction (3,), in the frame of the body that carries it, whose angle with ``axis`` (3,) in the base frame a
-    held leg keeps as it is at the goal."""
+    locked leg keeps as it is at the goal."""
 
     leg: str
     body: str
     direction: Array
     axis: Array
     moved: float
-    """How far what the leg's geometry was taken to be is from it (m)."""
+    """Distance that the leg's geometry was moved (m)."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -93,12 +93,12 @@ class TipLoci(Value):
     slide: Circle | Line | None = None
     angles: tuple[KeptAngle, ...] = ()
     error: float = 0.0
-    """How far a point of the robot can be from where it is at the exact goal (m)."""
+    """Distance of a point of the robot from its place at the exact goal (m)."""
     doubt: str | None = None
     as_written: bool = False
-    """Whether the numbers count as they are, and no special geometry is meant."""
+    """True if the numbers count as they are, without special geometry."""
     back: bool = False
-    """Whether it is the base that is seen from the platform: tips are points of the base as if that moved."""
+    """True if the base is observed from the platform: tips are points of the base as if that moved."""
 
 
 def tip_loci(
@@ -107,15 +107,16 @@ def tip_loci(
     pattern: ConstraintPattern,
     goal: ClosedConfiguration,
 ) -> TipLoci:
-    """Where all watched legs' tips can be with the directions held at their values at ``goal``.
+    """Return the loci of all observed legs' tips with the directions of ``goal``.
 
-    Raises ``UnsupportedLocus`` where that is no point, line, circle, sphere or plane, or the platform's motion none of
-    those known, or where a platform that turns can be held turned otherwise."""
+    Raises ``UnsupportedLocus`` if a locus is not a point, line, circle, sphere or plane, or the platform's motion is
+    not one of those known, or if a platform that rotates can be fixed in another rotation.
+    """
     name = decomposition.mechanism.name
     if pattern.motion == "other":
         raise UnsupportedLocus(name, "the pattern of its legs is not a known one")
     if pattern.turning and not any(_turned_once(decomposition, observation_model, leg, goal) for leg in pattern.legs):
-        raise UnsupportedLocus(name, "its legs may hold the platform turned otherwise")
+        raise UnsupportedLocus(name, "its legs may fix the platform in another rotation")
     plane = None if pattern.plane is None else _value(pattern.plane, goal)
     end = (
         plane
@@ -149,7 +150,8 @@ def _held_chain(
 def _turned_once(
     decomposition: LegDecomposition, observation_model: ObservationModel, leg: LockedLeg, goal: ClosedConfiguration
 ) -> bool:
-    """Whether the joints of a held leg leave its end one orientation, that at the goal, in all of its branches."""
+    """Return True if the joints of a locked leg leave its end one orientation, that at the goal, for all leg
+    solutions."""
     if leg.virtual or leg.turns:
         return False
     try:
@@ -168,7 +170,7 @@ def _angle(
         axis, direction = kept_angle(found)
     except LocusNotDerived as error:
         raise UnsupportedLocus(
-            decomposition.mechanism.name, f"how leg {leg.label} turns the platform is not known: {error}"
+            decomposition.mechanism.name, f"how leg {leg.label} rotates the platform is not known: {error}"
         ) from None
     return KeptAngle(leg.label, leg.body, goal.pose(leg.body)[:3, :3].T @ direction, axis, MOVED * found.moved)
 
@@ -207,7 +209,7 @@ def _tip(
     if here.freedoms == freedoms and np.linalg.norm(here.miss(B)) <= FOLLOWED * goal.model.length:
         return Tip(leg.label, leg.body, place, here, tuple(found[1:]), moved=moved)
     doubt = (
-        f"its joints taken one by one leave {here.freedoms} freedoms, together {freedoms}"
+        f"its joints taken one by one leave {here.freedoms} dof, together {freedoms}"
         if here.freedoms != freedoms
         else "its joints put its end elsewhere"
     )
@@ -234,7 +236,7 @@ def _fit_tip(
     paths = _held_paths(own, reference, leg, goal, tip.place)
     if not leg.fixed and not paths:
         raise UnsupportedLocus(
-            decomposition.mechanism.name, f"leg {leg.label} cannot be moved to see where its tip goes"
+            decomposition.mechanism.name, f"leg {leg.label} cannot be moved to find the locus of its tip"
         )
     worst = np.inf
     for curve in _candidates(decomposition, leg, B, goal):
@@ -341,8 +343,8 @@ def _apart(pattern: ConstraintPattern, goal: ClosedConfiguration, q: Array) -> t
 def _held_paths(
     own: Sequence[Observation], reference: str, leg: LockedLeg, goal: ClosedConfiguration, place: Array
 ) -> list[Array]:
-    """Positions of a tip when its leg alone, with what is measured held, is moved along each of its freedoms, and along
-    some random combinations of them."""
+    """Return the positions of a tip when its leg alone, with fixed measured values, is moved along each of its dof, and
+    along some random combinations of them."""
     rest = decompose(rezero(goal))
     model = PinocchioModel(alone(rest, rest.leg(leg.label)), goal.model.length)
     held = FixedValuesTask.at(model, model.q0, reference, own)

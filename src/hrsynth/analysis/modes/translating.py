@@ -39,15 +39,15 @@ from .square_systems import SquareSystem, resting, single, three_surfaces
 class Translating(Shifting):
     """A platform that only translates: q = p, shape (3,). ``tips`` has shape (n, 3).
 
-    What each tip can reach, moved by −b_i, holds the point p. Two curves of one plane meet as often as their degrees
-    say; two others do not meet at all unless one condition holds, so there one is met with a plane of the other, and
-    the rest checked.
+    The locus of each tip, moved by −b_i, contains the point p. Two curves of one plane meet as often as their degrees
+    allow; two others do not meet at all unless one condition holds, so there one is met with a plane of the other, and
+    the remaining condition is checked.
     """
 
     freedoms = 3
 
     def tips_at(self, q: Array) -> Array:
-        """Where the tips are at a pose; shape (legs, 3), metres."""
+        """Return the positions of the tips at a pose; shape (legs, 3), metres."""
         return np.asarray(q + self.tips)
 
     def apart(
@@ -58,7 +58,7 @@ class Translating(Shifting):
         return dict.fromkeys(legs, max((miss + length(point - q) for point, miss in points), default=0.0) + error)
 
     def spread(self, q: Array, apart: Mapping[int, float]) -> tuple[float, float]:
-        """How far the platform can be from its place at q (m); it does not turn."""
+        """Return how far the platform can be from its place at q (m); it does not rotate."""
         return min(apart.values()), 0.0
 
     def chart(self, number: int) -> PoseParametrization:
@@ -73,8 +73,8 @@ class Translating(Shifting):
         )
 
     def squares(self) -> Iterator[SquareSystem]:
-        """A tip at rest; pairs of paths that are curves, those of one plane first; a curve and a surface; three
-        surfaces, those that meet most squarely first."""
+        """A fixed tip; pairs of paths that are curves, those of one plane first; a curve and a surface; three surfaces,
+        those that meet most squarely first."""
         curves = {k: path for k, path in enumerate(self.paths) if not isinstance(path, Surface)}
         surfaces = {k: path for k, path in enumerate(self.paths) if isinstance(path, Surface)}
         for k, path in curves.items():
@@ -125,7 +125,7 @@ def met_normal(one: Curve, other: Reach) -> Array:
 
 
 def coplanar(one: Curve, other: Curve, size: float) -> bool:
-    """Whether two curves lie in one plane, to ``VANISHES``."""
+    """Return True if two curves lie in one plane, to ``VANISHES``."""
     between = (other.centre - one.centre) / size
     circles = [curve for curve in (one, other) if isinstance(curve, Circle)]
     lines = [curve.direction for curve in (one, other) if isinstance(curve, Line)]
@@ -141,9 +141,9 @@ class Articulated(Shifting):
     """Two bodies that translate: q = (p, θ), p (3,) the first body's origin, θ where the second is on ``slide``, a
     circle about it or (s for θ, in metres) a line.
 
-    tip_i = p + b_i on the first body, p + slide(θ) + b_i on the second; ``bodies`` says which, 0 or 1, for each
-    leg. The square systems take one leg of each body: with the tip of one as p, the sum (or difference) of two circles
-    lies on the third curve.
+    tip_i = p + b_i on the first body, p + slide(θ) + b_i on the second; ``bodies`` is 0 or 1 for each leg. The square
+    systems take one leg of each body: with the tip of one as p, the sum (or difference) of two circles lies on the
+    third curve.
     """
 
     bodies: tuple[int, ...]
@@ -157,7 +157,7 @@ class Articulated(Shifting):
 
     @cached_property
     def size(self) -> float:
-        """What residuals are divided by (m)."""
+        """Unit of residuals (m)."""
         return max(extent(self.curves, self.tips), self._radius)
 
     @property
@@ -165,12 +165,12 @@ class Articulated(Shifting):
         return self.slide.radius if isinstance(self.slide, Circle) else 0.0
 
     def freedoms_left(self, legs: Sequence[int]) -> int:
-        """Freedoms that some legs leave: of each body's three, and one at least where a body has no leg."""
+        """Return the dof that some legs leave: of each body's three, and one at least if a body has no leg."""
         sides = [sum(self.forbids[k] for k in legs if self.bodies[k] == body) for body in (0, 1)]
         return max(4 - sum(min(3, side) for side in sides), *(int(side == 0) for side in sides), 0)
 
     def tips_at(self, q: Array) -> Array:
-        """Where the tips are at a pose; shape (legs, 3), metres."""
+        """Return the positions of the tips at a pose; shape (legs, 3), metres."""
         origins = np.array([q[:3], q[:3] + self.slide.at(float(q[3]))])
         return np.asarray(origins[list(self.bodies)] + self.tips)
 
@@ -182,7 +182,7 @@ class Articulated(Shifting):
         return dict.fromkeys(legs, sum(miss for _, miss in points) + error)
 
     def spread(self, q: Array, apart: Mapping[int, float]) -> tuple[float, float]:
-        """How far the bodies can be from their places at q (m); they do not turn."""
+        """Return how far the bodies can be from their places at q (m); they do not rotate."""
         sides = [[each for k, each in apart.items() if self.bodies[k] == body] for body in (0, 1)]
         return max(min(side, default=math.inf) for side in sides), 0.0
 
@@ -219,7 +219,7 @@ class Articulated(Shifting):
                 yield self._square((first[0], onto[0]), first[1], onto[1])
 
     def _along_slide(self, curve: Curve) -> bool:
-        """Whether a circle lies in a plane parallel to the slide's."""
+        """Return True if a circle lies in a plane parallel to the slide's."""
         return (
             isinstance(curve, Circle)
             and isinstance(self.slide, Circle)
