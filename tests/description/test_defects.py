@@ -371,8 +371,8 @@ def test_a_damaged_file_is_read_or_refused_but_never_breaks(data: st.DataObject)
 @pytest.mark.parametrize(
     ("old", "new", "what"),
     [
-        ("<observe", "<observ", "no meaning inside <hrsynth>, found <observ>"),
-        ("<platform", '<loop name="z"/><platform', "no meaning inside <hrsynth>, found <loop>"),
+        ("<observe", "<observ", "no meaning inside <hrsynth>: got <observ>"),
+        ("<platform", '<loop name="z"/><platform', "no meaning inside <hrsynth>: got <loop>"),
         ("</joint>", '<mimic joint="a"/></joint>', "a <mimic> is a gear"),
     ],
 )

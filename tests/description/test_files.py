@@ -63,7 +63,7 @@ def test_what_is_no_file_is_refused(tmp_path: Path):
 
 def test_an_unknown_name_gets_close_matches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     robots = {name: tmp_path / f"{name}.urdf" for name in ("scissors", "linkage", "pendulum")}
-    monkeypatch.setattr(description, "shipped", lambda: robots)
+    monkeypatch.setattr(description, "list_robots", lambda: robots)
     with pytest.raises(BadRequest) as caught:
         description.load("linkge")
     assert caught.value.lines() == [

@@ -262,9 +262,9 @@ def test_the_command_line_and_python_see_the_same(capsys: pytest.CaptureFixture[
     np.testing.assert_allclose(point.camera.pose, parse_camera(cameras[0]).pose)
 
 
-@pytest.mark.parametrize("asked", [{"see": 5}, {"see": [3]}, {"camera": 4}])
+@pytest.mark.parametrize("asked", [{"sensor": 5}, {"sensor": [3]}, {"camera": 4}])
 def test_what_is_no_text_is_refused(asked: dict[str, Any]) -> None:
-    with pytest.raises(BadRequest, match="cameras and what they see, found"):
+    with pytest.raises(BadRequest, match="cameras and what they see: got"):
         ObservedRobot.of("gough_stewart", **asked)
 
 

@@ -68,13 +68,13 @@ def test_entities_are_not_expanded(dialect: str, tmp_path: Path):
 def test_an_unknown_name_tells_those_that_there_are(dialect: str, old: str, new: str, allowed: str, tmp_path: Path):
     text, count = re.subn(old, new, ONE[dialect], count=1)
     assert count
-    line = assert_refused(made(tmp_path, text), "unknown", "found nobody")
+    line = assert_refused(made(tmp_path, text), "unknown", "got nobody")
     assert re.search(f": expected {allowed}", line), line
 
 
 def test_a_cut_settings_file_is_refused_with_what_is_wanted(tmp_path: Path):
     made(tmp_path, URDF["urdf+"], "robot.urdf")
-    assert_refused(made(tmp_path, 'closed_loop: [["a", "b"', "robot.yaml"), "not YAML", "allowed: a whole file of YAML")
+    assert_refused(made(tmp_path, 'closed_loop: [["a", "b"', "robot.yaml"), "not YAML", "expected a whole file of YAML")
 
 
 @pytest.mark.parametrize("dialect", ONE)

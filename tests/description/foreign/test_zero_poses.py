@@ -145,7 +145,7 @@ def test_keyframes_place_all_links_as_mujoco_does(unit: str, tmp_path: Path):
             body = data.body(link)
             assert np.allclose(robot.links[link].pose[:3, 3], body.xpos, atol=1e-12)
             assert np.allclose(robot.links[link].pose[:3, :3], body.xmat.reshape(3, 3), atol=1e-12)
-    with pytest.raises(BadRequest, match="allowed: crouch, 1"):
+    with pytest.raises(BadRequest, match="expected crouch, 1"):
         read(tmp_path, text, "xml", platform="foot", keyframe="stand")
 
 
