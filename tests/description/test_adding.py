@@ -54,5 +54,5 @@ def test_its_defects_have_their_lines(sample: Path):
 
 
 def test_without_its_folder_it_is_unknown(tmp_path: Path):
-    with pytest.raises(BadRequest, match="unknown dialect"):
+    with pytest.raises(BadRequest, match="unknown format"):
         save(load("3rrr_m1"), tmp_path / "a.txt", "bars")

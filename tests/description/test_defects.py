@@ -256,8 +256,8 @@ def test_a_message_is_one_line_with_file_line_value_and_what_is_allowed():
 @pytest.mark.parametrize(
     ("text", "line", "what"),
     [
-        ("", 1, "an empty file"),
-        (b" \n\n", 1, "an empty file"),
+        ("", 1, "empty file"),
+        (b" \n\n", 1, "empty file"),
         (b"\0" * 100, 1, "malformed XML"),
         (FOUR_BAR.replace("crank", "kurbel-ü").encode("latin-1"), 3, "not UTF-8 text, 0xfc"),
         (FOUR_BAR.encode("utf-16"), 1, "not UTF-8 text, 0xff"),
@@ -298,7 +298,7 @@ def test_an_entity_bomb_is_refused_at_once():
     entities = "\n".join(f'<!ENTITY {b} "{f"&{a};" * 10}">' for a, b in pairwise(names))
     bomb = f'<?xml version="1.0"?>\n<!DOCTYPE robot [\n<!ENTITY a "ha">\n{entities}\n]>\n<robot name="&p;">&p;</robot>'
     start = time.perf_counter()
-    assert defects(bomb) == [(2, "a document type declaration, which is not allowed, None, None")]
+    assert defects(bomb) == [(2, "a document type declaration is not allowed, None, None")]
     assert time.perf_counter() - start < 1
 
 

@@ -121,13 +121,13 @@ WRONG = [
     ('<observe kind="direction" camera="eye" link="object"/>', "observe direction without the attribute: got axis"),
     (
         '<observe kind="point" link="object" at="0 0 0" radius="0.1"/>',
-        "observe point with an attribute it does not use: got radius, expected link, at",
+        "observe point does not use this attribute: got radius, expected link, at",
     ),
     (
         '<observe kind="encoder" joint="free" link="object"/>',
-        "observe encoder with an attribute it does not use: got link, expected joint",
+        "observe encoder does not use this attribute: got link, expected joint",
     ),
-    ('<camera name="eye" link="object"/>', "a second camera of this name: got eye"),
+    ('<camera name="eye" link="object"/>', "camera name already used: got eye"),
     ('<camera name="ear" link="thing"/>', "camera 'ear': unknown link: got thing"),
     ('<camera name="ear" link="base"> <image focal="-1"/> </camera>', "focal of <image>: got -1, expected more"),
     ('<observe kind="point" leg="a,b" link="object" at="0 0 0"/>', "a label that does not fit into a list: got a,b"),
@@ -172,8 +172,8 @@ ASKED_WRONG = [
         "a place, of which the kind direction has none: got '0,0,0', expected direction:LINK/dx,dy,dz",
     ),
     (["--sensor", "encoder:shoulder_1@0,0,0"], "a place, of which the kind encoder has none: got '0,0,0'"),
-    (["--sensor", "ear=point:platform@1,2,3"], "unknown camera: got 'ear', expected none is named"),
-    (["--camera", "a=base", "--camera", "a=rod_1", "--sensor", "point:platform@1,2,3"], "a second camera of this name"),
+    (["--sensor", "ear=point:platform@1,2,3"], "unknown camera: got 'ear', expected a camera declared with"),
+    (["--camera", "a=base", "--camera", "a=rod_1", "--sensor", "point:platform@1,2,3"], "camera name already used"),
     (
         ["--camera", "a=base", "--camera", "b=rod_1", "--sensor", "point:platform@1,2,3"],
         "by which camera: expected a=po",

@@ -164,7 +164,7 @@ def load(
     for note in found.notes:
         if note.base:
             warn_caller(shorten_text(f"{found.name}: {note.text}", MOST_WARNED), AssumedBase)
-    if found.choice is not None and found.choice.chosen == "guess":
+    if found.choice is not None and found.choice.chosen == "assumption":
         text = f"{found.name}: the platform is link {found.platform!r}, {found.choice}"
         warn_caller(shorten_text(f"{text} (platform={found.platform!r} confirms it)", MOST_WARNED), AssumedPlatform)
     return found
@@ -255,10 +255,10 @@ def _file_by_name(name: str, files: dict[str, Path], what: str, command: str) ->
     raise BadRequest(what, _short(name), f"a file or one of `hrsynth {command}`, such as " + ", ".join(close[:12]))
 
 
-def targets(path: str | Path, dialect: str | None = None) -> tuple[Path, ...]:
+def targets(path: str | Path, format: str | None = None) -> tuple[Path, ...]:
     """Return the files that :func:`save` writes, the tree first. Raises ``BadRequest`` for an unknown format or
     extension, and for files that cannot be written."""
-    files = _dialect(Path(path), dialect).files(Path(path))
+    files = _dialect(Path(path), format).files(Path(path))
     for file in files:
         require_writable(file)
     return files
@@ -266,7 +266,7 @@ def targets(path: str | Path, dialect: str | None = None) -> tuple[Path, ...]:
 
 @with_spelling
 def save(
-    mechanism: Mechanism | str | Path, path: str | Path, dialect: str | None = None, *, meshes: str = "keep"
+    mechanism: Mechanism | str | Path, path: str | Path, format: str | None = None, *, meshes: str = "keep"
 ) -> tuple[Note, ...]:
     """Write a robot file, completely or not at all, and return warnings of what the format cannot express.
 
@@ -277,8 +277,8 @@ def save(
     path
         File to write. A companion file is not replaced by other content, nor is a file that is read together with one
         that stays.
-    dialect
-        Format: ``native``, ``gepetto``, ``mjcf``, ``sdf`` or ``usd``. Default: by the extension, ``.urdf`` native,
+    format
+        ``native``, ``gepetto``, ``mjcf``, ``sdf`` or ``usd``. Default: by the extension, ``.urdf`` native,
         ``.xml`` and ``.mjcf`` MJCF, ``.sdf`` SDFormat, ``.usda``, ``.usd`` and ``.usdc`` USD, ``.yaml`` Gepetto (with a
         ``.urdf`` of the same name next to it).
     meshes
@@ -306,7 +306,7 @@ def save(
     if meshes not in ("keep", "copy"):
         raise BadRequest("meshes", meshes, ("keep", "copy"))
     target = as_path(path)
-    chosen, mechanism = _dialect(target, dialect), load(mechanism)
+    chosen, mechanism = _dialect(target, format), load(mechanism)
     robot, copies, notes = carry_meshes(mechanism, target, chosen.meshes, copy=meshes == "copy")
     new = write_meshes(copies)
     try:
@@ -334,7 +334,7 @@ def _require_whole(file: Path, others: Iterable[Path]) -> None:
             raise BadRequest(
                 f"cannot write the file: {partner.name} next to it would be read with it",
                 str(file),
-                f"another name, or {partner.name} moved away",
+                remedy=f"Choose another name or move {partner.name}.",
             )
 
 
@@ -345,7 +345,8 @@ def _dialect(target: Path, name: str | None) -> FileFormat:
         raise BadRequest(
             "cannot write the file: its extension belongs to no known format",
             str(target),
-            ", ".join(sorted(endings)) + "; or the dialect given",
+            ", ".join(sorted(endings)),
+            remedy="Name the format.",
         )
     wanted = name or endings[target.suffix.lower()]
     found = next((each for each in dialects if each.name == wanted), None)

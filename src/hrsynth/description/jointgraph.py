@@ -167,7 +167,7 @@ class JointGraph:
     def note_assumed(self) -> None:
         """Record the assumptions about many joints, one note for each kind."""
         for what, names in self.assumed.items():
-            self.note("guess", f"{what}: {comma_list(names)}")
+            self.note("assumption", f"{what}: {comma_list(names)}")
         self.assumed.clear()
 
     def fresh(self, name: str) -> str:

@@ -218,7 +218,7 @@ class PlatformChoice:
     reason: str
 
     def __str__(self) -> str:
-        return f"a guess: {self.reason}" if self.chosen == "guess" else self.reason
+        return f"assumed: {self.reason}" if self.chosen == "assumption" else self.reason
 
 
 NAMED = PlatformChoice("file", "named in the file")

@@ -111,7 +111,7 @@ def test_a_bushing_is_the_joint_that_its_stiffness_leaves(torque: str, tmp_path:
     else:
         robot = load(path)
         assert is_the_four_bar(robot)
-    assert any(f"read as a {STIFF[torque].name.lower()} joint" in each for each in notes(robot, "guess"))
+    assert any(f"read as a {STIFF[torque].name.lower()} joint" in each for each in notes(robot, "assumption"))
 
 
 def test_a_bushing_that_is_no_joint_of_loops_is_told(tmp_path: Path):
@@ -152,7 +152,7 @@ def test_a_detachable_joint_of_gazebo_holds_links_as_they_lie(model: str, tmp_pa
         text = text.replace(PIN, PIN + eye).replace(">bar<", ">eye<")
         robot = read(tmp_path, text)
     assert is_the_four_bar(robot)
-    assert any("detachable joint" in each for each in notes(robot, "guess"))
+    assert any("detachable joint" in each for each in notes(robot, "assumption"))
 
 
 @pytest.mark.parametrize("model", ["four_bar", "__model__"])
@@ -197,7 +197,7 @@ def test_paired_frames_of_any_spelling_close_loops(pair: tuple[str, str], tmp_pa
     robot = read(tmp_path, frames(*pair))
     assert is_the_four_bar(robot)
     if not pair[0].startswith("closing"):
-        assert any(f"{pair[0]}:{pair[1]}:spherical" in each for each in notes(robot, "guess"))
+        assert any(f"{pair[0]}:{pair[1]}:spherical" in each for each in notes(robot, "assumption"))
     sites = MJCF["sites"].replace('<connect name="d" site1="s" site2="t"/>', "")
     assert is_the_four_bar(read(tmp_path, sites.replace('"s"', f'"{pair[0]}"').replace('"t"', f'"{pair[1]}"'), "xml"))
 
@@ -241,7 +241,7 @@ def test_a_yaml_file_of_another_name_gives_the_closures(tmp_path: Path):
     (tmp_path / "closures.yaml").write_text(yaml)
     robot = read(tmp_path, text)
     assert is_the_four_bar(robot)
-    assert any("closures.yaml" in each for each in notes(robot, "guess"))
+    assert any("closures.yaml" in each for each in notes(robot, "assumption"))
     assert is_the_four_bar(load(tmp_path / "closures.yaml"))
     (tmp_path / "unlike.yaml").write_text(yaml.replace("one", "none"))
     assert is_the_four_bar(load(tmp_path / "robot.urdf"))
@@ -269,7 +269,7 @@ def test_a_world_that_nobody_declares_is_the_ground(tmp_path: Path):
     robot = read(tmp_path, text)
     assert is_the_four_bar(robot)
     assert robot.base == "world"
-    assert any("'world' is declared" in each for each in notes(robot, "guess"))
+    assert any("'world' is declared" in each for each in notes(robot, "assumption"))
 
 
 def test_hyphens_in_comments_and_undeclared_prefixes_are_told_and_read(tmp_path: Path):
@@ -385,7 +385,7 @@ def test_a_free_joint_is_no_bar(tmp_path: Path):
     robot = read(tmp_path, text, "xml")
     assert is_the_four_bar(robot)
     assert robot.base == "base"
-    assert any("'base' floats" in each for each in notes(robot, "guess"))
+    assert any("'base' floats" in each for each in notes(robot, "assumption"))
     kept = read(tmp_path, text, "xml", base="world", platform="bar")
     assert kept.base == "world"
 

@@ -122,7 +122,7 @@ def _bushing(reader: XmlReader, graph: JointGraph, element: xml.Element, frame_o
     axis = np.eye(3)[(free[1] or free[0] or (2,))[0]]
     graph.close(name, kind, ends, [axis], xml.line(element))
     graph.note(
-        "guess",
+        "assumption",
         f"{name!r} between {ends[0].link!r} and {ends[1].link!r} is read as a {kind.name.lower()} "
         "joint: it constrains the motions for which its stiffness is not zero",
     )
@@ -186,6 +186,6 @@ def _detachable(graph: JointGraph, plugin: xml.Element, poses: Mapping[str, Arra
     ends = FrameSpec(parent), FrameSpec(child, frozen(X))
     graph.close(graph.fresh("detachable_joint"), JointType.FIXED, ends, line=xml.line(plugin))
     graph.note(
-        "guess",
+        "assumption",
         f"the detachable joint of Gazebo holds {parent!r} and {child!r} as they lie at zero: read as a rigid closure",
     )

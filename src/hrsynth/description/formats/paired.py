@@ -56,11 +56,11 @@ def other_pairs(graph: JointGraph, frames: Mapping[str, FrameSpec]) -> None:
             continue
         graph.close(graph.fresh(match["stem"].strip("_-. ") or "closure"), kind, (frame, frames[partner]))
         graph.closing.update({name, partner})
-        read.setdefault("guess", []).append(wish)
+        read.setdefault("assumption", []).append(wish)
     for kind_of_note, wishes in read.items():
         what = (
             "frames close loops by their names (another type with --close A:B:TYPE): "
-            if kind_of_note == "guess"
+            if kind_of_note == "assumption"
             else "frames that by their names close a loop are left open, because the file closes others; --close "
         )
         graph.note(kind_of_note, what + ", ".join(wishes[:12]) + (" …" if wishes[12:] else ""))

@@ -68,7 +68,7 @@ RULES = (
         "what the file does not say, guessed from its structure",
         "A guess is made only where the structure leaves one choice; the answer still depends on it.",
         "say it in the file, or with the option named in the message",
-        find_notes("guess"),
+        find_notes("assumption"),
     ),
     LintRule(
         "ignored",

@@ -48,7 +48,9 @@ def read(file: RobotFile) -> JointGraph:
     graph.dialect = "Gepetto"
     graph.notes[:0] = notes
     if beside.stem != path.stem:
-        graph.note("guess", f"closures and motors are from {beside.name}, next to {path.name}: it names its frames")
+        graph.note(
+            "assumption", f"closures and motors are from {beside.name}, next to {path.name}: it names its frames"
+        )
     return _Settings(graph, beside, settings).apply()
 
 
@@ -132,7 +134,7 @@ class _Settings:
             self.graph.close(name, kind, (FrameSpec(links[0]), FrameSpec(links[1])))
             if words[number] not in ("3d", "6d"):
                 given = "without a type" if words[number] is None else f"of type {words[number]!r}"
-                self.graph.note("guess", f"closure {name!r} {given} is read as rigid (6d; a point is 3d)")
+                self.graph.note("assumption", f"closure {name!r} {given} is read as rigid (6d; a point is 3d)")
 
     def _kinds(self, kinds: list[Any], count: int) -> list[str | None]:
         """The closures' types in small letters, None where there is none: this dialect takes all but ``3d`` for 6d."""
@@ -158,7 +160,7 @@ class _Settings:
             wanted = [name for name, joint in joints.items() if "mot" in name and joint.type is not JointType.FIXED]
             if wanted:
                 self.graph.note(
-                    "guess",
+                    "assumption",
                     "the motors are " + ", ".join(wanted) + ": their names contain 'mot', the "
                     "convention of this dialect (--motors to change them)",
                 )

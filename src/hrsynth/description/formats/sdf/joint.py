@@ -217,7 +217,7 @@ def guess_motors(graph: JointGraph) -> None:
         for name in driven:
             graph.joints[name] = replace(graph.joints[name], motor=Motor(f"motor_{name}"))
         graph.note(
-            "guess",
+            "assumption",
             "the motors are " + ", ".join(driven) + ": the joints whose effort limit is not zero "
             "(--motors to change them)",
         )

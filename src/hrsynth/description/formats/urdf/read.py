@@ -108,7 +108,7 @@ class _TolerantReader(UrdfReader):
             self.require_sound()
         if WORLD not in self.links and any(end.link == WORLD for joint in self.joints.values() for end in joint.ends):
             self.links = {WORLD: Link(WORLD), **self.links}
-            self.notes.append(("guess", f"no link {WORLD!r} is declared: it is read as the ground"))
+            self.notes.append(("assumption", f"no link {WORLD!r} is declared: it is read as the ground"))
         self.check_ends("joint")
         self.require_some(self.links, "links", self.root)
         for ring in self.rings():

@@ -100,7 +100,7 @@ class _StageReader:
         name = own[0].values.get(f"{PREFIX}:name") if own else None
         graph = self.result = JointGraph(str(name or told["name"] or "robot"), self.file, "USD")
         if not told["metres_told"]:
-            graph.note("guess", "lengths are in centimetres, USD's default without metersPerUnit")
+            graph.note("assumption", "lengths are in centimetres, USD's default without metersPerUnit")
         if told["missing"]:
             graph.note("ignored", f"contents of other files, which are missing: {comma_list(told['missing'])}")
         for prim in self.prims.values():
@@ -485,7 +485,7 @@ class _StageReader:
             graph.joints[name] = replace(joint, ends=(near, joint.ends[1]), axes=axes, limits=limits)
         if apart:
             graph.note(
-                "guess",
+                "assumption",
                 "the bodies of these joints do not lie where the joints hold them, and are put there: "
                 + comma_list(apart),
             )
@@ -525,7 +525,7 @@ class _StageReader:
             self.result.joints[name] = replace(self.result.joints[name], motor=Motor(f"motor_{name}"))
         if len(driven) < len(gains):
             what = f"the motors are {comma_list(driven)}: the joints whose drives have gains (--motors to change them)"
-            self.result.note("guess", what)
+            self.result.note("assumption", what)
 
 
 def _is_locked(values: Mapping[str, Any], freedom: str) -> bool:
