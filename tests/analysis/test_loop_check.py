@@ -194,7 +194,7 @@ def test_lint_looks_at_all_of_a_file_without_a_platform(tmp_path: Path):
     path = tmp_path / "tree.urdf"
     path.write_text(tree(2, 2))
     found = {each.rule: each for each in hrsynth.lint(path).findings}
-    assert "several could be" in found["unsaid"].message
+    assert "several could be" in found["option-missing"].message
     assert "motor-none" in found
 
 

@@ -115,7 +115,7 @@ DEFECTS: dict[str, tuple[list, list[tuple[int, str]]]] = {
         [(7, '<parent link="bar"/>'), (20, '<parent link="bar"/>'), (2, "")],
         [(13, "tree joints that form a cycle")],
     ),
-    "joint to itself": ([(20, '<parent link="rocker"/>')], [(5, "second root"), (19, "'c' joins a link to itself")]),
+    "joint to itself": ([(20, '<parent link="rocker"/>')], [(5, "second root"), (19, "'c' connects a link to itself")]),
     "no platform": ([(38, "")], [(37, "no <platform>")]),
     "no own element": ([(37, ""), (38, ""), (39, ""), (40, "")], [(1, "no <hrsynth> element")]),
     "two own elements": ([(40, "</hrsynth><hrsynth/>")], [(40, "second <hrsynth>")]),
@@ -128,7 +128,7 @@ DEFECTS: dict[str, tuple[list, list[tuple[int, str]]]] = {
     "platform is the base": ([(38, '<platform link="base"/>')], [(38, "the platform is the base, base")]),
     "platform elsewhere": (
         [(5, '<link name="rocker"/><link name="moon"/>'), (38, '<platform link="moon"/>')],
-        [(5, "second root"), (38, "platform not reachable from the base 'base', moon")],
+        [(5, "second root"), (38, "platform not connected to the base 'base', moon")],
     ),
     "unknown camera": ([(39, '<camera link="eye"/>')], [(39, "camera: unknown link, eye")]),
     "observe unknown": ([(39, '<observe leg="1" link="cramk" axis="0 0 1"/>')], [(39, "observe: unknown link, cramk")]),
@@ -152,8 +152,8 @@ DEFECTS: dict[str, tuple[list, list[tuple[int, str]]]] = {
     ),
     "loop without an end": ([(26, "<!--"), (28, "-->")], [(25, "loop without <predecessor>, d")]),
     "loop of a missing link": ([(29, '<successor link="bier">')], [(29, "loop 'd': unknown link, bier")]),
-    "loop to itself": ([(29, '<successor link="rocker">')], [(25, "'d' joins a link to itself, rocker")]),
-    "negative velocity": ([(11, '<limit velocity="-1"/>')], [(11, "velocity of <limit>, -1, no negative number")]),
+    "loop to itself": ([(29, '<successor link="rocker">')], [(25, "'d' connects a link to itself, rocker")]),
+    "negative velocity": ([(11, '<limit velocity="-1"/>')], [(11, "velocity of <limit>, -1, a number of at least 0")]),
     "negative effort": ([(11, '<limit effort="-2"/>')], [(11, "effort of <limit>, -2")]),
     "crossed limits": ([(11, '<limit lower="1" upper="-1"/>')], [(11, "lower limit, 1, up to -1")]),
     "lower above zero": ([(11, '<limit lower="1"/>')], [(11, "lower limit, 1, up to 0")]),
@@ -195,7 +195,7 @@ DEFECTS: dict[str, tuple[list, list[tuple[int, str]]]] = {
                 '<ratio value="2"/></coupling><transmission name="m">',
             )
         ],
-        [(34, "successor of a coupling, coupled with itself, crank, another link")],
+        [(34, "successor of a coupling is its predecessor, crank, another link")],
     ),
     "gear that holds": (
         [
@@ -205,7 +205,7 @@ DEFECTS: dict[str, tuple[list, list[tuple[int, str]]]] = {
                 '<ratio value="-0"/></coupling><transmission name="m">',
             )
         ],
-        [(34, "ratio of a coupling, which would hold its second joint, -0, a number other than 0")],
+        [(34, "ratio of a coupling would fix its second joint, -0, a number other than 0")],
     ),
     "document type": (
         [(1, '<!DOCTYPE robot [<!ENTITY a "b">]>\n<robot name="&a;">')],
@@ -289,7 +289,7 @@ def test_a_file_without_links_is_told_what_to_name_instead(tmp_path: Path, name:
         pytest.importorskip("xacro")
     file = tmp_path / name
     file.write_text(text)
-    with pytest.raises(BadRobotFile, match=r"no (links|bodies).*holds macros, the file that uses it"):
+    with pytest.raises(BadRobotFile, match=r"no (links|bodies).*of parts or macros, the file that includes it"):
         load(file)
 
 
@@ -371,9 +371,9 @@ def test_a_damaged_file_is_read_or_refused_but_never_breaks(data: st.DataObject)
 @pytest.mark.parametrize(
     ("old", "new", "what"),
     [
-        ("<observe", "<observ", "no meaning inside <hrsynth>: got <observ>"),
-        ("<platform", '<loop name="z"/><platform', "no meaning inside <hrsynth>: got <loop>"),
-        ("</joint>", '<mimic joint="a"/></joint>', "a <mimic> is a gear"),
+        ("<observe", "<observ", "unknown element in <hrsynth>: got <observ>"),
+        ("<platform", '<loop name="z"/><platform', "unknown element in <hrsynth>: got <loop>"),
+        ("</joint>", '<mimic joint="a"/></joint>', "<mimic>: the native format has <coupling> instead"),
     ],
 )
 def test_what_would_change_the_robot_is_not_passed_over(old: str, new: str, what: str) -> None:
@@ -388,5 +388,5 @@ def test_a_label_that_no_list_of_legs_could_name_is_refused(label: str) -> None:
     text = FOUR_BAR
     if "<observe" not in text:
         text = text.replace("</hrsynth>", '<observe leg="1" link="bar"/></hrsynth>')
-    with pytest.raises(BadRobotFile, match="does not fit into a list of legs"):
+    with pytest.raises(BadRobotFile, match="not usable in a list"):
         native.parse(text.replace('leg="1"', f'leg="{label}"'))

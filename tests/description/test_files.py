@@ -67,8 +67,7 @@ def test_an_unknown_name_gets_close_matches(tmp_path: Path, monkeypatch: pytest.
     with pytest.raises(BadRequest) as caught:
         description.load("linkge")
     assert caught.value.lines() == [
-        "neither a file nor a shipped robot: got 'linkge', expected a file, or a name that `hrsynth robots` lists, "
-        "such as linkage"
+        "neither a file nor a shipped robot: got 'linkge', expected a file or one of `hrsynth robots`, such as linkage"
     ]
     with pytest.raises(BadRequest, match="such as scissors, linkage, pendulum"):
         description.load("zzz")

@@ -159,7 +159,7 @@ def _note_of(found: list[UnknownName]) -> Note:
     first = found[0]
     alike = first.remedy and f" (perhaps {first.remedy})"
     where = "" if first.line is None else f" (line {first.line}{', and more' * (len(found) > 1)})"
-    return Note("ignored", f"unknown {first.place}: {first.found}{alike}{where}")
+    return Note("ignored", f"unknown {first.place}: got {first.found}{alike}{where}")
 
 
 def misspelt(name: str, known: Iterable[str]) -> tuple[str, ...]:

@@ -76,7 +76,7 @@ def test_a_collinear_zero_pose_that_is_open_is_pushed_and_solved(tmp_path: Path)
     robot = read(tmp_path, bars(lengths, revolute("three", 0.3, "five", 0.5)))
     assert mobility(robot) == 3
     (solved,) = [note.text for note in robot.notes if note.kind == "solved"]
-    assert "after a random push out of a flat pose" in solved
+    assert "after a random push out of a flat configuration" in solved
     assert "p = " in solved
 
 
@@ -118,7 +118,7 @@ def test_an_overconstrained_loop_with_rounded_numbers_is_read_as_it_is_meant(siz
     axes = np.array([joint.axis for joint in robot.joints.values()])
     assert np.max(np.abs(np.cross(axes, axes[0]))) < 1e-12
     if size > 1e-8:
-        assert any("singular values as written leave a gap of" in note.text for note in robot.notes)
+        assert any("rank gap of the loops as written" in note.text for note in robot.notes)
 
 
 @pytest.mark.some(1)

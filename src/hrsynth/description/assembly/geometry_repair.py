@@ -68,7 +68,7 @@ class RepairedGeometry:
         for relation in self.mended:
             kinds[relation.kind][relation.of] = None
         found += [
-            Note("merged", f"made {kind}: " + "; ".join(comma_list(names, 40) for names in groups))
+            Note("merged", f"made to be {kind}: " + "; ".join(comma_list(names, 40) for names in groups))
             for kind, groups in kinds.items()
         ]
         return found
@@ -147,7 +147,7 @@ def _idealise_directions(mechanism: Mechanism, tolerance: float) -> Mechanism:
             if np.linalg.norm(meant - seen.direction) > EXACT:
                 found[number] = replace(seen, direction=meant)
                 told.append(f"of leg {seen.leg}")
-    note = Note("merged", f"made parallel to segments or axes: observed directions {', '.join(told)}")
+    note = Note("merged", f"made to be along segments or axes: observed directions {', '.join(told)}")
     return replace(mechanism, observations=tuple(found), notes=(*mechanism.notes, note)) if told else mechanism
 
 
