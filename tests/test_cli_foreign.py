@@ -32,7 +32,7 @@ def test_check_tells_what_was_guessed_and_json_stays_clean(call, tmp_path: Path)
     assert status == 0
     assert json.loads(out)["configurations"][0]["mobility"] == {"total": 1, "internal": 0}
     guess, motors = remarks
-    assert motors == "hrsynth: no joint is driven: --motors a,c could be (the joints at the base)"
+    assert motors == "hrsynth: no joint has a motor: try --motors a,c (the joints at the base)"
     assert guess.startswith(
         "hrsynth: assumption: the platform is link 'bar', the farthest from the base (--platform LINK"
     )
@@ -59,7 +59,7 @@ def test_closures_parts_and_frozen_joints_from_the_command_line(call, tmp_path: 
     assert remarks == [
         "hrsynth: open: no element of the file closes a loop: it is read as an open chain",
         "hrsynth: ignored: 1 links that are not between 'one' and 'three': base",
-        "hrsynth: no joint is driven: --motors q,r could be (all joints: no loop is closed)",
+        "hrsynth: no joint has a motor: try --motors q,r (all joints: no loop is closed)",
     ]
     status, out, _ = call("check", path, "--freeze", "p", "--json")
     assert json.loads(out)["configurations"][0]["dof"] == 2
