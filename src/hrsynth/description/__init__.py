@@ -275,8 +275,8 @@ def save(
     mechanism
         Mechanism, robot file or name of a robot.
     path
-        File to write. A companion file is not replaced by other content, nor is a file that is read together with one
-        that stays.
+        File to write. A file that goes with it is not replaced by other content, nor is a file that is read
+        together with one that stays.
     format
         ``native``, ``gepetto``, ``mjcf``, ``sdf`` or ``usd``. Default: by the extension, ``.urdf`` native,
         ``.xml`` and ``.mjcf`` MJCF, ``.sdf`` SDFormat, ``.usda``, ``.usd`` and ``.usdc`` USD, ``.yaml`` Gepetto (with a

@@ -1,4 +1,4 @@
-"""Joints with several degrees of freedom in a tree of one-dof joints: N is N__1, N__2, N__3 through bare links.
+"""Joints with several dof in a tree of one-dof joints: N is N__1, N__2, N__3 through bare links.
 
 | joint | chain                                   |
 | ----- | --------------------------------------- |

@@ -85,7 +85,7 @@ class FileFormat:
     the extensions of meshes that it can name (None: any). ``partner`` is the file on the disk that is read together
     with one.
 
-    A file is of the first dialect that knows it, in the order of ``rank``.
+    A file has the first format that recognises it, in the order of ``rank``.
     """
 
     name: str

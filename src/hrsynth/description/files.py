@@ -71,7 +71,7 @@ def require_same(path: Path, content: bytes) -> None:
         raise _unwritten(_reason(error), path) from None
     if not same:
         raise BadRequest(
-            "cannot write the companion file: it exists with other content",
+            "cannot write the file that goes with it: it exists with other content",
             str(path),
             "another name",
         )

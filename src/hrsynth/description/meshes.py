@@ -144,7 +144,7 @@ def carry_meshes(
     """A robot whose meshes are named from the folder of ``target``; what has to be written there for it (``copy``: all
     meshes, into ``meshes/``); and notes.
 
-    A dialect that can name only files with certain ``endings`` gets no others, nor names of files that are not there.
+    A format that can name only files with certain extensions (``endings``) gets no others, nor names of missing files.
     """
     if robot.file is None or not any("<mesh" in fragment for link in robot.links.values() for fragment in link.xml):
         return replace(robot, file=str(target)), {}, []

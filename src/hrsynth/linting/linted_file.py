@@ -44,7 +44,9 @@ class LintedFile:
     ) -> None:
         self.given, self.readers, self.other = given or Overrides(), readers, other
         opened = robot_file(Path(path), strict=False)
-        if opened.root is None and isinstance(graph := formats.read(opened), JointGraph):  # settings next to a document
+        if opened.root is None and isinstance(
+            graph := formats.read(opened), JointGraph
+        ):  # a YAML file next to a document
             opened = robot_file(Path(graph.file), strict=False)
         self.path, self.file = opened.path, str(opened.path)
         self.data = xml.content(opened.path) if text is None else text

@@ -2,9 +2,6 @@
 
 The joint graph is contracted step by step: every edge carries its architecture notation and the joints and links inside
 it, until nothing contracts any more.
-
-The joint graph is contracted step by step: every edge carries the word of what it stands for, and the joints and links
-inside it, until nothing contracts any more.
 """
 
 from __future__ import annotations

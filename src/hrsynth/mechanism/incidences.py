@@ -285,7 +285,7 @@ def _tower(sieve: Sieve, classes: Array) -> tuple[tuple[tuple[tuple[int, ...], .
     """Return the incidence of each class with earlier ones, in an order in which each has a choice, and its place in
     it.
 
-    The last is the one that lies in the fewest different planes, and so on with the rest.
+    The last is the one that lies in the fewest different planes, and so on with the others.
     """
     n = len(classes)
     normal = sieve.keep(choices(n, 2), lambda c, s: dot(classes[c[:, 0], s], classes[c[:, 1], s]), SAME_DIRECTION)

@@ -1,10 +1,10 @@
-"""Legs and platform, found by structure, never by names.
+"""Legs and platform, identified by structure, never by names.
 
-The platform is the smallest set of links around the platform link that leaves the greatest number of legs, each joined
-to the base and to one link of the platform (an articulated platform has several links). A link whose segment the file
-observes is part of a leg: it is in the platform only if it is the platform link. In a single loop in which one
-chain has one dof more than the other, the platform link is the last segment of the shorter one: the legs share the
-end joint.
+The platform is the smallest set of links around the platform link that leaves the greatest number of legs, each
+connected to the base and to one link of the platform (an articulated platform has several links). A link whose segment
+the file observes is part of a leg: it is in the platform only if it is the platform link. In a single loop in which one
+chain has one dof more than the other, the platform link is the last segment of the shorter one: the legs share the end
+joint.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Links, joints and mechanisms: a frozen multigraph, its geometry given at the zero configuration.
 
 All points and directions are in the base link's frame *at the zero configuration*, where every loop is closed. A joint
-therefore needs no frames of its own: a centre and its axes say all. SI units, radians.
+therefore needs no frames of its own: a centre and its axes suffice. SI units, radians.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class JointType(StrEnum):
 
     @property
     def freedoms(self) -> int:
-        """Degrees of freedom between the joint's two links."""
+        """Dof of the joint's two links relative to each other."""
         return {"R": 1, "P": 1, "U": 2, "S": 3, "C": 2, "E": 3, "F": 0, "6": 6}[self.value]
 
     @property

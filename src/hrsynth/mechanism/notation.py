@@ -3,10 +3,6 @@
 Letters are joint types, Π a planar parallelogram; a bar under a letter (``*`` after it in ASCII) is a motor. Braces
 hold parallel parts: ``{2-SS}`` two equal parallel rods, ``{a|b}`` chains side by side, ``{R-PP}`` a chain R whose end
 carries a link that only translates on PP (MMT Fig. 4(b)).
-
-Letters are joint types, Π a planar parallelogram; a bar under a letter (``*`` after it in ASCII) is a motor. Braces
-hold what stands in parallel: ``{2-SS}`` two equal parallel rods, ``{a|b}`` chains side by side, ``{R-PP}`` a chain R
-whose end carries a link that only translates on PP (MMT Fig. 4(b)).
 """
 
 from __future__ import annotations

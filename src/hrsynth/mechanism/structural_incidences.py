@@ -2,8 +2,8 @@
 
 A direction is fixed in a link; an R, a C or an E carries that of its axis to its other link, a P every direction, a U
 each of its axes to its cross. A centre is fixed in the links of its joint, and a point on the axis of an R in both of
-them. Heights along a direction pass an R or E about it and a P normal to it. A relation between what shares a link in
-this sense holds wherever the links go, in every operation mode; other relations may follow from closed loops.
+them. Heights along a direction pass an R or E about it and a P normal to it. Incidences between
+geometry of one link in this sense hold in all configurations and operation modes; others may follow from closed loops.
 """
 
 from __future__ import annotations

@@ -197,7 +197,7 @@ def _couplings(graph: JointGraph, mechanism: Mechanism) -> list[Coupling]:
 
 
 def _away_from_singular(mechanism: Mechanism) -> Mechanism:
-    """Replace a zero configuration at which the loops have more degrees of freedom than nearby by one nearby."""
+    """Replace a zero configuration at which the loops have a higher mobility than nearby by one nearby."""
     assembly = LoopAssembly.of(mechanism)
     zero = assembly.zero()
     there = regular_values(assembly, zero)

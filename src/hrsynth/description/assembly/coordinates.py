@@ -52,7 +52,7 @@ def without_coordinates(mechanism: Mechanism) -> Mechanism:
 
 
 def mobility(mechanism: Mechanism) -> int:
-    """Return the mobility: the degrees of freedom of all joints together at the zero configuration."""
+    """Return the mobility at the zero configuration."""
     assembly = LoopAssembly.of(mechanism)
     return sum(joint.kind.freedoms for joint, _, _ in assembly.tree) - assembly.rank(assembly.zero()).value
 

@@ -1,8 +1,8 @@
 """Geometry repair: relations that hold to the digits of a file are made exact with the least change.
 
-Printed digits and CAD leave axes parallel to 1e-6, balls of three axes that miss each other, rods equal to 1e-7 m. Such
-noise opens loops, changes ranks (a loop with redundant constraints becomes rigid) and hides what a link is. Of all
-mechanisms with the relations that hold within a tolerance, the nearest one takes the place of the file's:
+Printed digits and CAD leave axes parallel to 1e-6, S of three axes that do not meet, rods equal to 1e-7 m. Such noise
+opens loops, changes ranks (a loop with redundant constraints becomes rigid) and hides the type of joints. Of all
+mechanisms with the relations that hold within a tolerance, the nearest one replaces the file's:
 min ‖x − x₀‖ subject to f(x) = 0, by Gauss-Newton on the constraints with a pull back along their tangent space.
 """
 

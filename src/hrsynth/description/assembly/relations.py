@@ -1,9 +1,9 @@
 """Relations that nearly hold between joints: axes parallel, perpendicular, coaxial, through one point; centres in a
 plane, in line with an axis; rods equal.
 
-All axes that are nearly parallel are one direction, all lines and balls that nearly meet share one point (a *place*):
-so spherical and planar loops, U joints and balls of several R need no relation of their own. Lengths in characteristic
-lengths; a *defect* is by how much a relation misses (characteristic lengths, radians).
+All axes that are nearly parallel are one direction, all lines and spherical joints that nearly meet share one
+point (a *place*): so spherical and planar loops, U joints and S of several R need no relation of their own. Lengths in
+characteristic lengths; a *defect* is the residual of a relation (characteristic lengths, radians).
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
 """Closures that tools add to URDF and SDFormat alike: Drake's constraints and bushings, plugins of Gazebo.
 
 Those that are complete become closures; for others a note gives the ``--close`` that adds them.
-
-What can be read becomes a closure; what only looks like one is told, with the ``--close`` that would make it one.
 """
 
 from __future__ import annotations

@@ -45,8 +45,7 @@ def text(mechanism: Mechanism) -> str:
 
 
 def joint_names(joint: Joint) -> list[str]:
-    """Return the names of the file's joints for a tree joint: one for each degree of freedom, but one for a free
-    joint."""
+    """Return the names of the file's joints for a tree joint: one for each coordinate, but one for a free joint."""
     return chains.part_names(joint.name, 1 if joint.type is JointType.FREE else joint.type.freedoms)
 
 

@@ -1,8 +1,6 @@
 """Conventions of tools for closures that URDF cannot express: each is a function that the reader calls.
 
 A new convention is one more function and its line in ``CONVENTIONS``.
-
-A new convention is one more function and its line in ``CONVENTIONS``.
 """
 
 from __future__ import annotations

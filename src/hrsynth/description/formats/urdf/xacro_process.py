@@ -2,11 +2,11 @@
 then the document. It writes no files and reads none elsewhere. An error is one line of JSON on standard error.
 
 Expressions are Python's in syntax only: a walker over the syntax tree computes them from an allow-list. Its values are
-numbers, texts, truth values, None, and lists and dictionaries of these; functions can be called but are no values, and
-nothing has attributes. The package's own ``eval`` is taken away.
+numbers, texts, truth values, None, and lists and dictionaries of these; functions can be called but are not values, and
+nothing has attributes. The package's own ``eval`` is removed.
 
-``$(find PACKAGE)`` stands for the folder, the file's own or one above it, that has what follows. Variables of the
-environment are empty.
+``$(find PACKAGE)`` is the folder, the file's own or one above it, that has the path behind it. Environment variables
+are empty.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Writer of USD text: rigid bodies of an articulation, joints of UsdPhysics, loops excluded from the articulation.
 
-UsdPhysics holds joint frames, limits and masses in single precision, angles in degrees. The same numbers stand beside
-them in double precision, as attributes ``hrsynth:…`` that other programs leave alone; reading takes those as long as
-they agree.
+UsdPhysics holds joint frames, limits and masses in single precision, angles in degrees. The same numbers are next to
+them in double precision, as attributes ``hrsynth:…`` that other programs ignore; reading prefers those if they agree.
 """
 
 from __future__ import annotations
@@ -257,7 +256,7 @@ def _limits(kind: JointType, limits: Limits, free: tuple[str, ...], apis: list[s
 
 
 def _drive(kind: JointType, limits: Limits | None, free: tuple[str, ...], apis: list[str]) -> Iterator[str]:
-    """Return a drive without gains (the simulator's user chooses them) for each degree of freedom."""
+    """Return a drive without gains (the simulator's user chooses them) for each coordinate."""
     words = {JointType.REVOLUTE: ("angular",), JointType.PRISMATIC: ("linear",)}.get(kind, free)
     for word in words:
         apis.append(f"PhysicsDriveAPI:{word}")
