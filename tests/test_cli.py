@@ -302,7 +302,7 @@ def test_a_file_that_cannot_be_written_is_told_before_any_work(
     for path, reason in (
         (tmp_path / "none" / file.format("x"), "no such folder"),
         (taken, "a directory"),
-        (tmp_path / file.format("x" * 300), "no such file can be made in its folder"),
+        (tmp_path / file.format("x" * 300), "its folder allows no such file"),
     ):
         (line,) = run(*most, path).refused()
         assert line.startswith(f"hrsynth: cannot write the file: {reason}"), line
@@ -737,7 +737,7 @@ def test_advise_tries_what_is_offered(run):
     assert run("derive", *words, *chosen, "--json").data["verdict"] == "controllable"
     assert run("advise", *words, "--candidate-sensor", "point:platform@0,0.1,0", "--json").data["sets"]
     assert (
-        "--candidate-sensor encoder:base: an encoder"
+        "--candidate-sensor encoder:base: encoders are always tried on all joints"
         in run("advise", "delta", "--candidate-sensor", "encoder:base").refused()[0]
     )
     assert "--candidate-sensor point:moon@" in run("advise", "delta", "--candidate-sensor", "point:moon").refused()[0]
@@ -958,7 +958,7 @@ def test_path_text_has_the_verdict_the_path_and_what_is_not_proved(run):
         (["--start", "x=0", "--goal", "z=0.1"], 2, ["cannot change z"]),
         (["--start", "x=0", "--goal", "x=0.01", "--observe", "7"], 2, ["no leg or link", "'7'"]),
         (["--start", "x=0"], 2, ["--goal"]),
-        (["--start", "x=0", "--goal", "x=0", "--as-written", "--tolerance", "1e-3"], 2, ["one of the two"]),
+        (["--start", "x=0", "--goal", "x=0", "--as-written", "--tolerance", "1e-3"], 2, ["Omit one"]),
     ],
 )
 def test_path_refuses_what_does_not_fit(run, arguments: list[str], status: int, words: list[str]):
@@ -1178,7 +1178,7 @@ def test_nothing_is_written_over_the_file_that_is_read(run, robot):
         ("convert", file, file, "--to", "sdf"),
         ("derive", file, "-o", file),
     ):
-        assert "it is the one being read" in run(*arguments).refused()[0]
+        assert "it is the input file" in run(*arguments).refused()[0]
     assert file.read_bytes() == once
 
 

@@ -30,10 +30,12 @@ def test_check_tells_what_was_guessed_and_json_stays_clean(call, tmp_path: Path)
     path = written(tmp_path, FILES["sdf: 1.7"])
     status, out, remarks = call("check", path, "--json")
     assert status == 0
-    assert json.loads(out)["configurations"][0]["mobility"] == {"total": 1, "idle": 0}
+    assert json.loads(out)["configurations"][0]["mobility"] == {"total": 1, "internal": 0}
     guess, motors = remarks
-    assert motors == "hrsynth: no joint is driven: --motors a,c could be (the joints at the base)"
-    assert guess.startswith("hrsynth: guess: the platform is link 'bar', the farthest from the base (--platform LINK")
+    assert motors == "hrsynth: no joint has a motor: try --motors a,c (the joints at the base)"
+    assert guess.startswith(
+        "hrsynth: assumption: the platform is link 'bar', the farthest from the base (--platform LINK"
+    )
     status, out, remarks = call("check", path, "--platform", "bar", "--motors", "a", "--observe", "crank", "--json")
     assert (status, remarks) == (0, [])
     assert json.loads(out)["configurations"][0]["real"] is not None
@@ -55,9 +57,9 @@ def test_closures_parts_and_frozen_joints_from_the_command_line(call, tmp_path: 
     assert status == 0
     assert json.loads(out)["configurations"][0]["dof"] == 2
     assert remarks == [
-        "hrsynth: open: nothing in the file closes a loop: it is read as an open chain",
+        "hrsynth: open: no element of the file closes a loop: it is read as an open chain",
         "hrsynth: ignored: 1 links that are not between 'one' and 'three': base",
-        "hrsynth: no joint is driven: --motors q,r could be (all joints: no loop is closed)",
+        "hrsynth: no joint has a motor: try --motors q,r (all joints: no loop is closed)",
     ]
     status, out, _ = call("check", path, "--freeze", "p", "--json")
     assert json.loads(out)["configurations"][0]["dof"] == 2
@@ -84,5 +86,5 @@ def test_convert_goes_between_all_dialects(call, tmp_path: Path):
     assert (tmp_path / "c.urdf").is_file()
     assert call("check", tmp_path / "d.urdf")[2] == []
     status, _, lines = call("convert", source, tmp_path / "e.xml", "--to", "step")
-    assert (status, len([line for line in lines if "unknown dialect" in line])) == (2, 1)
+    assert (status, len([line for line in lines if "unknown format" in line])) == (2, 1)
     assert not (tmp_path / "e.xml").exists()

@@ -310,7 +310,7 @@ def test_what_lies_elsewhere_is_not_copied(homes: Path):
     (homes / "ws" / "pkg" / "urdf" / "robot.urdf").write_text(robot("../../../secret.obj"))
     (homes / "out").mkdir()
     (note,) = save(homes / "ws" / "pkg" / "urdf" / "robot.urdf", homes / "out" / "robot.sdf", meshes="copy")
-    assert note.text == "meshes outside of the robot's folders are left alone: ../../../secret.obj"
+    assert note.text == "meshes outside of the robot's folders keep their paths: ../../../secret.obj"
     assert [path.name for path in (homes / "out").iterdir()] == ["robot.sdf"]
 
 

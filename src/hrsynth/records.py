@@ -135,7 +135,7 @@ class Platform(TypedDict):
     """The link that is the platform (the first body of a formation; null where it is open); what chose it, and why."""
 
     link: str | None
-    chosen: Literal["file", "option", "guess", "open"]
+    chosen: Literal["file", "option", "assumption", "open"]
     reason: str
 
 

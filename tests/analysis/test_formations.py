@@ -434,7 +434,7 @@ def test_a_file_without_a_platform_must_be_a_formation():
 
 
 def test_drones_that_observe_nothing_are_told_what_a_formation_needs(page: str):
-    with pytest.raises(BadRobotFile, match="a <platform>, or of a formation <observe> between its bodies"):
+    with pytest.raises(BadRobotFile, match="a <platform>, or <observe> between the bodies of a formation"):
         native.parse(re.sub("<observe .*?/>", "", page))
 
 

@@ -23,7 +23,7 @@ from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.model import PlatformChoice
 from oracle import Oracle
 
-OPEN = PlatformChoice("open", "several could be: expected --platform LINK")
+OPEN = PlatformChoice("open", "several links could be it. Choose it with --platform LINK")
 TREE = ["1 0 0", "0 1 0", "0.6 0 0.8"]
 
 
@@ -93,7 +93,7 @@ def test_the_mobility_of_an_open_tree_is_the_sum_of_its_freedoms(branches: int, 
     assert (found.mobility.total, found.constraints.rows, found.redundant) == (branches * long, 0, ())
     assert "none, an open tree" in hrsynth.text(found)
     motors = ",".join(f"j{branch}_{k}" for branch in range(branches) for k in range(long))
-    assert found.more[-1] == f"no joint is driven: --motors {motors} could be (all joints: no loop is closed)"
+    assert found.more[-1] == f"no joint has a motor: try --motors {motors} (all joints: no loop is closed)"
 
 
 @pytest.mark.parametrize("legs", [2, 3])
@@ -115,7 +115,7 @@ def test_what_no_segment_tells_is_answered_and_viewed(legs: int, tmp_path: Path)
 WAY: dict[str, object] = {"start": "x=0", "goal": "x=0.01"}
 GIVEN: dict[str, dict[str, object]] = {
     "accuracy": {"cone": "0.1deg"},
-    "basins": {"to": "x=0", "grid": "x=0:0.1:2"},
+    "basins": {"goal": "x=0", "grid": "x=0:0.1:2"},
     "path": WAY,
     "select": WAY,
     "servo": WAY,
@@ -126,7 +126,7 @@ GIVEN: dict[str, dict[str, object]] = {
 @pytest.mark.parametrize("command", sorted(analyses().keys() - {"check", "view"}))
 def test_every_other_question_asks_for_the_platform(command: str):
     for robot in (opened("3rrr_m1"), load(tree(2, 2))):
-        with pytest.raises(NoPlatform, match="allowed: --platform LINK"):
+        with pytest.raises(NoPlatform, match="Choose it with --platform LINK"):
             getattr(hrsynth, command)(robot, **GIVEN.get(command, {}))
     assert isinstance(hrsynth.check(opened("3rrr_m1")), LoopCheck)
 
@@ -138,9 +138,9 @@ def test_motors_are_proposed_where_none_is_driven(name: str, tmp_path: Path, cap
     still = replace(robot, joints={name: replace(joint, motor=None) for name, joint in robot.joints.items()})
     names = [joint.name for joint in robot.joints.values() if joint.actuated]
     assert robot.proposed_motors is None
-    assert still.proposed_motors == f"no joint is driven: --motors {','.join(names)} could be (the joints at the base)"
+    assert still.proposed_motors == f"no joint has a motor: try --motors {','.join(names)} (the joints at the base)"
     save(still, tmp_path / "still.urdf")
-    told = f"--motors {','.join(names)} could be (the joints at the base)"
+    told = f"--motors {','.join(names)} (the joints at the base)"
     for command, status in (("derive", 0), ("check", 0), ("export", 2)):
         capsys.readouterr()
         output = ["-o", str(tmp_path / "code.hpp")] if command == "export" else []
@@ -185,7 +185,7 @@ def test_a_robot_without_a_platform_is_written_without_one(tmp_path: Path, name:
         warnings.simplefilter("ignore")
         again = load(tmp_path / f"robot.{ending}")
     assert again.choice is not None
-    assert again.choice.chosen in ("guess", "open")
+    assert again.choice.chosen in ("assumption", "open")
     one, two = Oracle(robot), Oracle(again)
     assert one.mobility(one.zero()) == two.mobility(two.zero())
 
@@ -194,7 +194,7 @@ def test_lint_looks_at_all_of_a_file_without_a_platform(tmp_path: Path):
     path = tmp_path / "tree.urdf"
     path.write_text(tree(2, 2))
     found = {each.rule: each for each in hrsynth.lint(path).findings}
-    assert "several could be" in found["unsaid"].message
+    assert "several links could be" in found["option-missing"].message
     assert "motor-none" in found
 
 

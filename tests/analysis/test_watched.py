@@ -21,7 +21,7 @@ from oracle import Oracle
 WHY = {
     "quattro": "the first of the parallel rods before the platform",
     "3rrr_m1": "the last segment before the platform",
-    "gough_stewart": "the axis of the slide",
+    "gough_stewart": "the axis of the prismatic joint",
 }
 
 
@@ -39,7 +39,7 @@ def test_the_watched_axis_is_told_with_its_reason(name: str):
 
 def test_sets_of_links_that_are_asked_for():
     found = legs("delta", observe="arm_1,rod_2a")
-    assert [why for _, why in found.setup.observed_axes()] == ["asked for", WHY["quattro"]]
+    assert [why for _, why in found.setup.observed_axes()] == ["requested", WHY["quattro"]]
     assert [each.legs for each in found.sets] == [("1",), ("2",), ("1", "2")]
     single = [check("delta", observe=link).postures[0].hidden.rank for link in ("arm_1", "rod_2a")]
     assert [each.rank for each in found.sets[:2]] == single

@@ -49,10 +49,10 @@ def test_the_dialect_of_the_page_is_read_and_written(sample: Path):
 
 def test_its_defects_have_their_lines(sample: Path):
     sample.write_text(sample.read_text().replace('one="base" two="rocker"', 'one="bose" two="rocker"'))
-    with pytest.raises(BadRobotFile, match=r"four_bar.bars:4: revolute: unknown bar, found bose"):
+    with pytest.raises(BadRobotFile, match=r"four_bar.bars:4: revolute: unknown bar: got bose"):
         load(sample)
 
 
 def test_without_its_folder_it_is_unknown(tmp_path: Path):
-    with pytest.raises(BadRequest, match="unknown dialect"):
+    with pytest.raises(BadRequest, match="unknown format"):
         save(load("3rrr_m1"), tmp_path / "a.txt", "bars")

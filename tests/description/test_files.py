@@ -56,19 +56,18 @@ def test_what_is_no_file_is_refused(tmp_path: Path):
     assert "cannot be read" in refused(tmp_path / ("x" * 5000 + ".urdf"))
     assert "cannot be read" in refused("a\0b.urdf")
     (tmp_path / "empty.urdf").touch()
-    assert "an empty file" in refused(tmp_path / "empty.urdf")
+    assert "empty file" in refused(tmp_path / "empty.urdf")
     os.mkfifo(tmp_path / "pipe.urdf")
     assert "not a regular file" in refused(tmp_path / "pipe.urdf")
 
 
 def test_an_unknown_name_gets_close_matches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     robots = {name: tmp_path / f"{name}.urdf" for name in ("scissors", "linkage", "pendulum")}
-    monkeypatch.setattr(description, "shipped", lambda: robots)
+    monkeypatch.setattr(description, "list_robots", lambda: robots)
     with pytest.raises(BadRequest) as caught:
         description.load("linkge")
     assert caught.value.lines() == [
-        "neither a file nor a shipped robot: got 'linkge', expected a file, or a name that `hrsynth robots` lists, "
-        "such as linkage"
+        "neither a file nor a shipped robot: got 'linkge', expected a file or one of `hrsynth robots`, such as linkage"
     ]
     with pytest.raises(BadRequest, match="such as scissors, linkage, pendulum"):
         description.load("zzz")

@@ -80,5 +80,5 @@ def test_an_object_of_yourdfpy_is_read_as_the_file_that_it_writes(tmp_path: Path
     assert derive(found).hidden_architecture == derive(load("rrrrr_m1")).hidden_architecture
     assert (found.file, found.sha256) == (str(list_robots()["rrrrr_m1"]), None)
     for other in (5, None, tree.robot):
-        with pytest.raises(BadRequest, match=r"allowed: a path, .*, a yourdfpy\.URDF$"):
+        with pytest.raises(BadRequest, match=r"expected a path, .*, a yourdfpy\.URDF$"):
             load(other)

@@ -111,27 +111,27 @@ WRONG = [
     ('<observe kind="point" link="object" at="0 0"/>', "observe point: at: got 0 0, expected 3 numbers"),
     ('<observe kind="point" link="object" at="0 0 nan"/>', "observe point: at: got 0 0 nan, expected finite"),
     ('<observe kind="point" camera="ear" link="object" at="0 0 0"/>', "unknown camera: got ear, expected eye"),
-    ('<observe kind="point" camera="eye" link="base" at="0 0 0"/>', "seen from the same link: got base"),
+    ('<observe kind="point" camera="eye" link="base" at="0 0 0"/>', "the camera is on the same link: got base"),
     ('<observe kind="line" link="object" at="0 0 0" axis="0 0 0"/>', "axis: got 0 0 0, expected a non-zero vector"),
     ('<observe kind="edge" link="object" at="0 0 0" axis="0 0 1" radius="0"/>', "radius .m.: got 0.0"),
     ('<observe kind="edges" link="object" at="0 0 0" axis="0 0 1" radius="-1"/>', "got -1.0, expected more than 0"),
-    ('<observe kind="inclination" link="base"/>', "of the base itself: got base"),
+    ('<observe kind="inclination" link="base"/>', "the base does not move: got base"),
     ('<observe kind="encoder" joint="gear"/>', "unknown joint: got gear, expected free"),
-    ('<observe kind="encoder" joint="free"/>', "the joint 'free': got free, expected one with one axis"),
+    ('<observe kind="encoder" joint="free"/>', "type of joint 'free': got free, expected one with one axis"),
     ('<observe kind="direction" camera="eye" link="object"/>', "observe direction without the attribute: got axis"),
     (
         '<observe kind="point" link="object" at="0 0 0" radius="0.1"/>',
-        "observe point with an attribute it does not use: got radius, expected link, at",
+        "observe point does not use this attribute: got radius, expected link, at",
     ),
     (
         '<observe kind="encoder" joint="free" link="object"/>',
-        "observe encoder with an attribute it does not use: got link, expected joint",
+        "observe encoder does not use this attribute: got link, expected joint",
     ),
-    ('<camera name="eye" link="object"/>', "a second camera of this name: got eye"),
+    ('<camera name="eye" link="object"/>', "camera name already used: got eye"),
     ('<camera name="ear" link="thing"/>', "camera 'ear': unknown link: got thing"),
     ('<camera name="ear" link="base"> <image focal="-1"/> </camera>', "focal of <image>: got -1, expected more"),
-    ('<observe kind="point" leg="a,b" link="object" at="0 0 0"/>', "a label that does not fit into a list: got a,b"),
-    (2 * '<observe kind="point" leg="a" link="object" at="0 0 0"/>', "a second one with this label: got a"),
+    ('<observe kind="point" leg="a,b" link="object" at="0 0 0"/>', "label not usable in a list: got a,b"),
+    (2 * '<observe kind="point" leg="a" link="object" at="0 0 0"/>', "label already used: got a"),
 ]
 
 
@@ -145,7 +145,7 @@ def test_what_is_wrong_in_a_file_is_said_in_its_line(line: str, said: str, tmp_p
 
 ASKED_WRONG = [
     (["--sensor", "point"], "--sensor: got 'point', expected "),
-    (["--sensor", "point:platform"], "where on the link"),
+    (["--sensor", "point:platform"], "point on the link"),
     (["--sensor", "point:platform@1,2"], "observe point: at: got '1 2', expected 3 numbers"),
     (["--sensor", "point:thing@1,2,3"], "unknown link: got 'thing', expected base"),
     (["--sensor", "=point:platform@1,2,3"], "--sensor =point:platform@1,2,3: the camera's name: got ''"),
@@ -166,17 +166,17 @@ ASKED_WRONG = [
         "a camera to which nothing is given to see: got 'far', expected --sensor far=",
     ),
     (["--sensor", "line:platform@1,2,3"], "without the attribute: got 'axis'"),
-    (["--sensor", "point:platform@1,2,3/0,0,1"], "more than the kind needs: got '0,0,1', expected at"),
+    (["--sensor", "point:platform@1,2,3/0,0,1"], "too many values for this kind: got '0,0,1', expected at"),
     (
         ["--sensor", "direction:platform@0,0,0/1,0,0"],
-        "a place, of which the kind direction has none: got '0,0,0', expected direction:LINK/dx,dy,dz",
+        "kind direction has no point: got '0,0,0', expected direction:LINK/dx,dy,dz",
     ),
-    (["--sensor", "encoder:shoulder_1@0,0,0"], "a place, of which the kind encoder has none: got '0,0,0'"),
-    (["--sensor", "ear=point:platform@1,2,3"], "unknown camera: got 'ear', expected none is named"),
-    (["--camera", "a=base", "--camera", "a=rod_1", "--sensor", "point:platform@1,2,3"], "a second camera of this name"),
+    (["--sensor", "encoder:shoulder_1@0,0,0"], "kind encoder has no point: got '0,0,0'"),
+    (["--sensor", "ear=point:platform@1,2,3"], "unknown camera: got 'ear', expected a camera declared with"),
+    (["--camera", "a=base", "--camera", "a=rod_1", "--sensor", "point:platform@1,2,3"], "camera name already used"),
     (
         ["--camera", "a=base", "--camera", "b=rod_1", "--sensor", "point:platform@1,2,3"],
-        "by which camera: expected a=po",
+        "no camera named: expected a=po",
     ),
     (
         ["--camera", "a=base@1,2", "--sensor", "point:platform@1,2,3"],
@@ -262,9 +262,9 @@ def test_the_command_line_and_python_see_the_same(capsys: pytest.CaptureFixture[
     np.testing.assert_allclose(point.camera.pose, parse_camera(cameras[0]).pose)
 
 
-@pytest.mark.parametrize("asked", [{"see": 5}, {"see": [3]}, {"camera": 4}])
+@pytest.mark.parametrize("asked", [{"sensor": 5}, {"sensor": [3]}, {"camera": 4}])
 def test_what_is_no_text_is_refused(asked: dict[str, Any]) -> None:
-    with pytest.raises(BadRequest, match="cameras and what they see, found"):
+    with pytest.raises(BadRequest, match="cameras and what they see: got"):
         ObservedRobot.of("gough_stewart", **asked)
 
 

@@ -191,7 +191,7 @@ def test_another_unknown_name_is_said_once_and_names_of_other_programs_are_not(t
     assert execute(["legs", str(path)]) == 0
     (said,) = capsys.readouterr().err.splitlines()
     line = text.split("<hrsynth>")[0].count("\n") + 1
-    assert said == f"hrsynth: ignored: unknown element in <robot>, found <hydraulics> (line {line}, and more)"
+    assert said == f"hrsynth: ignored: unknown element in <robot>: got <hydraulics> (line {line}, and more)"
 
 
 @pytest.mark.parametrize(

@@ -267,7 +267,7 @@ def test_gears_are_compared(tmp_path: Path):
         (tmp_path / f"{name}.urdf").write_text(gear.format(ratio))
     found = hrsynth.lint(tmp_path / "one.urdf", compare=tmp_path / "other.urdf", platform="c")
     (said,) = [each.message for each in found.findings if each.rule.startswith("differs-")]
-    assert said == "'t' with the ratio 2 here, 't' with the ratio 3 there"
+    assert said == "coupling 't' with the ratio 2 here, coupling 't' with the ratio 3 there"
 
 
 def test_one_line_files_keep_their_names(tmp_path: Path):
@@ -278,5 +278,5 @@ def test_one_line_files_keep_their_names(tmp_path: Path):
     model = damaged(path.read_text(), put('link[@name="prox_1"]/inertial/mass', value="-1.5"))
     path.write_text(model.replace("\n", ""))
     found = hrsynth.lint(path, fix=True)
-    assert [each.rule for each in found.mended] == ["mass-negative"]
+    assert [each.rule for each in found.fixed] == ["mass-negative"]
     assert not found.reaches("warning")

@@ -149,13 +149,13 @@ def bad(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_sarif_is_as_its_schema_says(bad: Path):
-    found = hrsynth.lint([bad, "quattro"], ignore="guessed")
+    found = hrsynth.lint([bad, "quattro"], ignore="assumed")
     log = json.loads(sarif(found))
     Draft202012Validator.check_schema(SARIF)
     assert [each.message for each in Draft202012Validator(SARIF).iter_errors(log)] == []
     (run,) = log["runs"]
     rules = run["tool"]["driver"]["rules"]
-    assert "guessed" not in {each["id"] for each in rules}
+    assert "assumed" not in {each["id"] for each in rules}
     assert len(run["results"]) == len(found.findings)
     for result, finding in zip(run["results"], found.findings, strict=True):
         assert rules[result["ruleIndex"]]["id"] == result["ruleId"] == finding.rule
@@ -257,7 +257,7 @@ def test_json_and_fix_on_the_command_line(bad: Path, capsys):
     assert execute(["lint", str(bad), "--fix", "-o", "mended.urdf", "--format", "json"]) == 0
     record = json.loads(capsys.readouterr().out)
     assert record["file"] == "mended.urdf"
-    assert [(each["rule"], each["fixable"]) for each in record["mended"]] == [("limits-order", True)]
+    assert [(each["rule"], each["fixable"]) for each in record["fixed"]] == [("limits-order", True)]
     assert record["counts"]["error"] == 0
     assert execute(["lint", str(bad), "--fix"]) == 0
     assert f"The mended file is written to {bad}." in capsys.readouterr().out
@@ -313,7 +313,7 @@ def test_a_mend_of_a_file_that_xacro_made_is_left_to_its_source(tmp_path: Path):
     (tmp_path / "plain.urdf").write_text(text)
     (plain,) = (each for each in hrsynth.lint(tmp_path / "plain.urdf").findings if each.rule == "mass-negative")
     assert [(each.line, each.fixable) for each in negative] == [(plain.line, False)]
-    assert (found.written, found.mended) == (None, ())
+    assert (found.written, found.fixed) == (None, ())
 
 
 @pytest.mark.parametrize("door", ["robot.yaml", ""])

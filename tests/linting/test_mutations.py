@@ -78,7 +78,7 @@ def test_all_defects_of_a_random_robot_are_found_and_mended(robot: Mechanism, se
         assert not any(each.fixable for each in hrsynth.lint(one).findings)
         assert set(order) <= {each.rule for each in hrsynth.lint(two).findings}
         found = hrsynth.lint(two, fix=True)
-        assert {each.rule for each in found.mended} == set(order)
+        assert {each.rule for each in found.fixed} == set(order)
         assert not any(each.fixable for each in found.findings)
         differences = load(two).differences(load(one))
         assert [each for each in differences if "limits of joint" not in each and "content of link" not in each] == []

@@ -107,10 +107,10 @@ def test_mimics_are_read_as_is_said():
 def test_the_construct_of_a_file_is_recognised(name: str, tmp_path: Path):
     path = tmp_path / "robot.urdf"
     path.write_text(URDF[name])
-    (found,) = [each for each in hrsynth.lint(path).findings if each.rule == "reader-drops"]
+    (found,) = [each for each in hrsynth.lint(path).findings if each.rule == "program-drops"]
     assert f"({WRITTEN[name]}): " in found.message
     assert found.severity == "note"
-    asked = [each for each in hrsynth.lint(path, program=["mujoco", "isaac"]).findings if each.rule == "reader-drops"]
+    asked = [each for each in hrsynth.lint(path, program=["mujoco", "isaac"]).findings if each.rule == "program-drops"]
     programs = {each.message.split("): ")[1].split()[0] for each in asked}
     assert programs == ({"mujoco"} if name in ("loop_joint", "two joints, one child") else {"mujoco", "isaac"})
     assert {each.severity for each in asked} == {"error"}

@@ -85,7 +85,7 @@ def test_what_is_mended_is_the_sound_file_again(case: Case, tmp_path: Path, shel
     target = tmp_path / f"mended{case.ending}"
     found = hrsynth.lint(two, fix=True, output=target)
     assert case.rule not in {each.rule for each in found.findings}
-    assert {each.rule for each in found.mended} == {case.rule}
+    assert {each.rule for each in found.fixed} == {case.rule}
     assert Path(found.written or "") == target
     assert two.read_bytes() == before
     if case.geometry:
@@ -135,7 +135,7 @@ def test_what_another_element_names_is_not_taken_out(naming: str, tmp_path: Path
     found = hrsynth.lint(two, fix=True, output=tmp_path / "mended.urdf")
     assert "refused" not in {each.rule for each in found.findings}
     assert "constraint-dead" in {each.rule for each in found.findings}
-    assert found.mended == ()
+    assert found.fixed == ()
 
 
 def test_the_sound_limits_are_counted_from_the_new_zero(tmp_path: Path, shelf: Path):
@@ -171,7 +171,7 @@ def test_a_mimic_follows_from_the_new_zero(tmp_path: Path):
         <successor link="bar"><origin xyz="2 0 0"/></successor><axis xyz="0 1 0"/></loop></robot>"""
     )
     before = load(path, platform="bar")
-    assert [each.rule for each in hrsynth.lint(path, platform="bar", fix=True).mended] == ["loop-open"]
+    assert [each.rule for each in hrsynth.lint(path, platform="bar", fix=True).fixed] == ["loop-open"]
     after = load(path, platform="bar")
     assert not [note for note in after.notes if note.kind == "solved"]
     assert after.differences(before) == []
@@ -248,7 +248,7 @@ def test_a_mirrored_closure_is_found_and_turned(tmp_path: Path):
     assert rules_in(good)["loop-mirrored"] == 0
     assert rules_in(bad)["loop-mirrored"] == 1
     found = hrsynth.lint(bad, fix=True)
-    assert [each.rule for each in found.mended] == ["loop-mirrored"]
+    assert [each.rule for each in found.fixed] == ["loop-mirrored"]
     assert load(bad).differences(load(good)) == []
 
 
@@ -256,7 +256,7 @@ def test_redundant_constraints_are_named_and_counted(tmp_path: Path):
     """A planar loop closed by a hinge has 3 constraints too many, six balls have none."""
     found = [each for each in hrsynth.lint("3rrr_m1").findings if each.rule == "constraint-redundant"]
     assert [each.message for each in found] == [
-        f"3 of the 5 constraints of 'wrist_{leg}' repeat those of the loops before it" for leg in (2, 3)
+        f"3 of the 5 constraints of 'wrist_{leg}' are redundant with those of earlier loops" for leg in (2, 3)
     ]
     assert rules_in(list_robots()["gough_stewart"])["constraint-redundant"] == 0
 
@@ -292,7 +292,7 @@ def test_rounded_loops_are_not_closed_by_moving_joints(name: str, tmp_path: Path
     path = exported(of_hinges(load(name)), tmp_path / "robot.urdf", 4)
     before = load(path)
     found = hrsynth.lint(path, fix=True)
-    assert {each.rule for each in found.mended} == {"geometry-rounded"}
+    assert {each.rule for each in found.fixed} == {"geometry-rounded"}
     after = load(path, as_written=True)
     assert [text for text in after.differences(before, 1e-9) if not text.startswith("pose of link")] == []
     assert normal_form(after).mechanism.joints.keys() == normal_form(before).mechanism.joints.keys()
@@ -303,7 +303,7 @@ def test_a_file_that_is_near_to_two_robots_is_left_to_a_person(tmp_path: Path):
     text = path.read_bytes()
     found = hrsynth.lint(path, fix=True)
     assert [each.rule for each in found.findings if each.severity == "error"] == ["refused"]
-    assert not found.mended
+    assert not found.fixed
     assert path.read_bytes() == text
 
 
@@ -364,24 +364,24 @@ def test_frames_of_consecutive_joints_may_coincide(tmp_path: Path, joints: tuple
         (
             ("<transmission name", "<tranmission name", "</transmission>", "</tranmission>"),
             "<transmission name",
-            "element in <robot>, found <tranmission>, nearly <transmission>",
+            "element in <robot>: got <tranmission>, similar to <transmission>",
             "error",
         ),
         (
             ("<transmission name", "<tranmision name", "</transmission>", "</tranmision>"),
             "<transmission name",
-            "element in <robot>, found <tranmision>, nearly <transmission>",
+            "element in <robot>: got <tranmision>, similar to <transmission>",
             "warning",
         ),
-        (('<axis xyz="0 0 1"', '<axis xzy="0 0 1"'), "<axis", "attribute of <axis>, found xzy, nearly xyz", "error"),
-        (('<axis xyz="0 0 1"', '<Axis xyz="0 0 1"'), "<axis", "nearly <axis>", "error"),
+        (('<axis xyz="0 0 1"', '<axis xzy="0 0 1"'), "<axis", "attribute of <axis>: got xzy, similar to xyz", "error"),
+        (('<axis xyz="0 0 1"', '<Axis xyz="0 0 1"'), "<axis", "similar to <axis>", "error"),
         (
             ('<predecessor link="dist_2">\n      <origin xyz', '<predecessor link="dist_2">\n      <origin xy'),
             '<predecessor link="dist_2">',
-            "attribute of <origin>, found xy, nearly xyz",
+            "attribute of <origin>: got xy, similar to xyz",
             "error",
         ),
-        (("<hrsynth>", "<hydraulics/>\n<hrsynth>"), "<hrsynth>", "element in <robot>, found <hydraulics>", "note"),
+        (("<hrsynth>", "<hydraulics/>\n<hrsynth>"), "<hrsynth>", "element in <robot>: got <hydraulics>", "note"),
         (("<hrsynth>", '<w:thing xmlns:w="urn:w"/>\n<hrsynth>'), "", "", ""),
     ],
 )

@@ -37,7 +37,7 @@ def test_what_may_be_written(text: str, wanted: Pose) -> None:
 @pytest.mark.parametrize(
     ("text", "what"),
     [
-        ("x=0:1:3", "from:to:count is of a grid"),
+        ("x=0:1:3", "from:to:count is for grids"),
         ("", "name=value"),
         ("x", "name=value"),
         ("x=", "not a number"),

@@ -1,4 +1,4 @@
-"""Robot files and mechanisms, both ways: one module a dialect."""
+"""Robot files and mechanisms, both ways: one module a file format."""
 
 from __future__ import annotations
 
@@ -42,19 +42,19 @@ if TYPE_CHECKING:
 __all__ = ["list_examples", "list_robots", "load", "native", "save", "spanning", "targets"]
 
 NAMED = "a path, the name of a shipped robot, example:NAME"
-"""How a robot's file is given."""
+"""Ways to give a robot's file."""
 LOADED = f"{NAMED}, an open file, XML text, a yourdfpy.URDF"
-"""What is read."""
+"""Objects that are read."""
 MOST_TOLD = 60
-"""Letters of what was given that an error tells."""
+"""Letters of a given value that a message shows."""
 MOST_WARNED = 400
 """Letters of a warning."""
 GIVEN, NOWHERE = "the given text", "(nowhere, as no file is given)"
-"""What errors call text, and the folder of the files that it names."""
+"""Name of a given text in errors, and of the folder of the files that it names."""
 
 
 def list_robots() -> dict[str, Path]:
-    """The robots that come with the package: name to file, sorted by name.
+    """Return the robots of the package: name to file, sorted by name.
 
     >>> "3rrr_m1" in hrsynth.list_robots()
     True
@@ -79,40 +79,64 @@ def load(
     tolerance: float | None = None,
     as_written: bool = False,
 ) -> Mechanism:
-    """The mechanism of a robot file in any dialect, of a shipped robot given by its name, or of one from the package
-    example-robot-data (``example:cassie``); of an open file or of XML text (what holds ``<``), whose root element tells
-    the dialect, while files that text names relatively lie nowhere; of a ``yourdfpy.URDF``, read as the file that it
-    writes (a tree, whose closures are given); a mechanism is returned unchanged.
+    """Return the mechanism of a robot file, of a robot of the package by its name, or of a given text or object.
 
-    Where base or platform are guessed, ``AssumedBase`` and ``AssumedPlatform`` (kinds of ``UserWarning`` in
-    ``hrsynth.errors``) are warned of. Where several links could be the platform, it stays open, and is asked for by the
-    first question that needs it.
+    Parameters
+    ----------
+    robot
+        Path of a file in any format; name of a robot of the package, or ``example:NAME`` of the package
+        example-robot-data; an open file; XML text (any text with ``<``; relative file names in it are not found); a
+        ``yourdfpy.URDF``, read as the file that it writes (a tree, whose closures are given); or a mechanism, which is
+        returned unchanged.
+    base
+        Base link. Only the part between base and platform remains.
+    platform
+        Platform link.
+    motors
+        Joints with motors, as a list or a text with commas, like all lists here.
+    observe
+        Links to observe at their default segments.
+    close
+        Closures ``A:B[:TYPE]`` that make the frames of two links (or points ``A@x,y,z`` in them, m) meet.
+    freeze
+        Joints to fix at zero.
+    keyframe
+        Keyframe of the file or of an SRDF file next to it (or ``FILE.srdf:NAME``) that becomes the zero configuration.
+    unit
+        Unit of the file's lengths: m, mm, cm or in.
+    tolerance
+        Relations of joints (axes parallel, perpendicular, through one point; equal rods …) that hold to this tolerance
+        (characteristic lengths, rad) are made exact with the least change. Default: from the file's digits.
+    as_written
+        Keep the numbers of the file as they are.
 
-    What a file does not say can be given: the ``platform`` link, the joints of the ``motors``, the links to ``observe``
-    at their default segments, closures ``A:B[:type]`` that make the frames of two links (or points ``A@x,y,z`` in them)
-    meet, joints to ``freeze``, a ``keyframe`` named in the file or in an SRDF file next to it, which becomes the zero
-    pose (or ``FILE.srdf:NAME``), the ``unit`` of the file's lengths (m, mm, cm, in). With ``base`` only what lies
-    between base and platform remains. Lists may be texts with commas. What was guessed or solved is reported in the
-    mechanism's ``notes``.
-
-    Numbers with few decimals are read as they are meant: relations of joints (axes parallel, perpendicular, through one
-    point; equal rods …) that hold to ``tolerance`` (characteristic lengths, radians; None: from the file's digits) are
-    made exact with the least change, and reported; with ``as_written`` none is.
+    Returns
+    -------
+    Mechanism
+        Links, joints and loops, all geometry in the base frame at the zero configuration (m, rad). ``notes`` lists
+        what reading assumed, solved or repaired.
 
     Raises
     ------
     BadRequest
-        For an unknown name, with the names closest to it. If something must be given, and for given names that the file
-        does not have.
+        For an unknown name, with the closest names, and if an option is missing.
     BadRobotFile
-        With every defect of the file and its line.
+        For defects of the file, all of them with their lines.
     LoopsNotClosed, RankUndecided, StructureUndecided
-        For a file whose loops stay open, or in which rounded numbers leave no gap between free and held, or fit another
-        robot as well.
+        For loops that stay open, and for rounded numbers that leave the rank of the loops or the structure undecided.
 
+    Warns
+    -----
+    AssumedBase, AssumedPlatform
+        For an assumed base or platform. If several links could be the platform, it stays open until an analysis needs
+        it.
+
+    Examples
+    --------
     >>> hrsynth.load("3rrr_m1")
     <Mechanism: 3rrr_m1, 8 links, 9 joints, 3 motors>
     """
+
     overrides = Overrides.said(
         base=base,
         platform=platform,
@@ -128,9 +152,9 @@ def load(
     if isinstance(robot, Mechanism):
         if overrides.any or tolerance is not None or base is not None or observe is not None:
             raise BadRequest(
-                "options that fill in a robot file are given for a robot that is already read",
+                "--base, --platform and the other file overrides need a file: this robot is already read",
                 robot.name,
-                "the file of a robot, or its name",
+                "a file or the name of a robot",
             )
         return robot
     if isinstance(robot, os.PathLike) or (isinstance(robot, str) and "<" not in robot):
@@ -140,15 +164,15 @@ def load(
     for note in found.notes:
         if note.base:
             warn_caller(shorten_text(f"{found.name}: {note.text}", MOST_WARNED), AssumedBase)
-    if found.choice is not None and found.choice.chosen == "guess":
+    if found.choice is not None and found.choice.chosen == "assumption":
         text = f"{found.name}: the platform is link {found.platform!r}, {found.choice}"
-        warn_caller(shorten_text(f"{text} (platform={found.platform!r} to say so)", MOST_WARNED), AssumedPlatform)
+        warn_caller(shorten_text(f"{text} (platform={found.platform!r} confirms it)", MOST_WARNED), AssumedPlatform)
     return found
 
 
 def _read_content(robot: Any, overrides: Overrides) -> Mechanism:
-    """The mechanism of text, of an open file, which is read where it lies if it has what lies there, or of an object of
-    yourdfpy, whose meshes lie where that looks for them. Raises ``BadRequest`` for anything else."""
+    """Return the mechanism of a text, an open file (read at its path if the content is the same) or a ``yourdfpy.URDF``
+    (meshes in its folder). Raises ``BadRequest`` for anything else."""
     looked_in, name = None, str(getattr(robot, "name", ""))
     if isinstance(robot, str):
         data: Any = robot
@@ -156,7 +180,7 @@ def _read_content(robot: Any, overrides: Overrides) -> Mechanism:
         try:
             data = robot.read(LARGEST_FILE + 1)
         except (OSError, ValueError):
-            raise BadRequest("an open file", _short(robot), "one that is open for reading") from None
+            raise BadRequest("the open file cannot be read", _short(robot), "a file that is open for reading") from None
     elif type(robot).__module__.partition(".")[0] == "yourdfpy" and hasattr(robot, "write_xml_string"):
         data, name = robot.write_xml_string(), ""
         looked_in = getattr(getattr(robot, "_filename_handler", None), "keywords", {}).get("dir")
@@ -195,17 +219,17 @@ def _read_content(robot: Any, overrides: Overrides) -> Mechanism:
 
 
 def _lines(data: bytes) -> list[bytes]:
-    """The lines of a file, whatever ends them, without a mark of the encoding: text that is read has lost both."""
+    """Return the lines of a file without line ends and byte order mark, which text that is read has lost."""
     return data.removeprefix(BOM_UTF8).splitlines()
 
 
 def _short(value: object) -> object:
-    """A value that is told, whole where that is short."""
+    """Return a value as a message shows it: whole if it is short."""
     return value if len(repr(value)) <= MOST_TOLD else shorten_text(str(value), MOST_TOLD - 2)
 
 
 def file_of(robot: str | os.PathLike[str]) -> Path:
-    """The file that a name or a path stands for; raises ``BadRequest`` for a name of no robot."""
+    """Return the file of a name or path. Raises ``BadRequest`` for an unknown robot."""
     if not isinstance(robot, str | os.PathLike) or robot == "" or (isinstance(robot, str) and {"\n", "<"} & {*robot}):
         raise BadRequest("a robot's file", _short(robot), NAMED)
     path = Path(robot)
@@ -224,19 +248,17 @@ def file_of(robot: str | os.PathLike[str]) -> Path:
 
 
 def _file_by_name(name: str, files: dict[str, Path], what: str, command: str) -> Path:
-    """The file of a robot by its name; raises ``BadRequest`` with the names closest to it."""
+    """Return the file of a robot by its name. Raises ``BadRequest`` with the closest names."""
     if name in files:
         return files[name]
     close = difflib.get_close_matches(name, files, n=5) or list(files)
-    raise BadRequest(
-        what, _short(name), f"a file, or a name that `hrsynth {command}` lists, such as " + ", ".join(close[:12])
-    )
+    raise BadRequest(what, _short(name), f"a file or one of `hrsynth {command}`, such as " + ", ".join(close[:12]))
 
 
-def targets(path: str | Path, dialect: str | None = None) -> tuple[Path, ...]:
-    """The files that :func:`save` writes, the tree first; raises ``BadRequest`` for an unknown dialect or ending, and
-    where they cannot be written."""
-    files = _dialect(Path(path), dialect).files(Path(path))
+def targets(path: str | Path, format: str | None = None) -> tuple[Path, ...]:
+    """Return the files that :func:`save` writes, the tree first. Raises ``BadRequest`` for an unknown format or
+    extension, and for files that cannot be written."""
+    files = _dialect(Path(path), format).files(Path(path))
     for file in files:
         require_writable(file)
     return files
@@ -244,30 +266,47 @@ def targets(path: str | Path, dialect: str | None = None) -> tuple[Path, ...]:
 
 @with_spelling
 def save(
-    mechanism: Mechanism | str | Path, path: str | Path, dialect: str | None = None, *, meshes: str = "keep"
+    mechanism: Mechanism | str | Path, path: str | Path, format: str | None = None, *, meshes: str = "keep"
 ) -> tuple[Note, ...]:
-    """Write a robot file, completely or not at all, of a mechanism or of a robot given by its file or name; what the
-    dialect cannot express is returned as warnings.
+    """Write a robot file, completely or not at all, and return warnings of what the format cannot express.
 
-    ``dialect`` is ``native``, ``gepetto``, ``mjcf``, ``sdf`` or ``usd``; without it the file's extension decides:
-    ``.urdf`` native, ``.xml`` and ``.mjcf`` MJCF, ``.sdf`` SDFormat, ``.usda``, ``.usd`` and ``.usdc`` USD, ``.yaml``
-    Gepetto (with a ``.urdf`` of the same name next to it). A companion of the named file is not replaced by other
-    content, nor is a file that is read together with one that stays. Meshes stay where they are and are named from the
-    new file's folder; with ``meshes="copy"`` they are copied into ``meshes/`` next to it.
+    Parameters
+    ----------
+    mechanism
+        Mechanism, robot file or name of a robot.
+    path
+        File to write. A file that goes with it is not replaced by other content, nor is a file that is read
+        together with one that stays.
+    format
+        ``native``, ``gepetto``, ``mjcf``, ``sdf`` or ``usd``. Default: by the extension, ``.urdf`` native,
+        ``.xml`` and ``.mjcf`` MJCF, ``.sdf`` SDFormat, ``.usda``, ``.usd`` and ``.usdc`` USD, ``.yaml`` Gepetto (with a
+        ``.urdf`` of the same name next to it).
+    meshes
+        ``keep``: meshes stay and are named from the new file's folder; ``copy``: they are copied to ``meshes/`` next to
+        it.
+
+    Returns
+    -------
+    tuple of Note
+        Warnings of what is lost.
 
     Raises
     ------
     BadRequest
-        For an unknown dialect or extension; if the file cannot be written, or the dialect cannot express the mechanism.
+        For an unknown format or extension, a file that cannot be written, or a mechanism that the format cannot
+        express.
 
+    Examples
+    --------
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     notes = hrsynth.save(hrsynth.load("3rrr_m1"), f"{folder}/robot.urdf")
     """
+
     if meshes not in ("keep", "copy"):
         raise BadRequest("meshes", meshes, ("keep", "copy"))
     target = as_path(path)
-    chosen, mechanism = _dialect(target, dialect), load(mechanism)
+    chosen, mechanism = _dialect(target, format), load(mechanism)
     robot, copies, notes = carry_meshes(mechanism, target, chosen.meshes, copy=meshes == "copy")
     new = write_meshes(copies)
     try:
@@ -287,7 +326,7 @@ def save(
 
 
 def _require_whole(file: Path, others: Iterable[Path]) -> None:
-    """Raise ``BadRequest`` where a file that is to be replaced is read together with one that stays."""
+    """Raise ``BadRequest`` if a file to be replaced is read together with one that stays."""
     partners = [each.partner(file) for each in formats.dialects().values() if os.path.isfile(file)]
     written = set(map(os.path.realpath, others))
     for partner in filter(None, partners):
@@ -295,7 +334,7 @@ def _require_whole(file: Path, others: Iterable[Path]) -> None:
             raise BadRequest(
                 f"cannot write the file: {partner.name} next to it would be read with it",
                 str(file),
-                f"another name, or {partner.name} moved away",
+                remedy=f"Choose another name or move {partner.name}.",
             )
 
 
@@ -304,12 +343,13 @@ def _dialect(target: Path, name: str | None) -> FileFormat:
     endings = {ending: each.name for each in dialects for ending in each.endings}
     if name is None and target.suffix.lower() not in endings:
         raise BadRequest(
-            "cannot write the file: its extension is not that of a known dialect",
+            "cannot write the file: its extension belongs to no known format",
             str(target),
-            ", ".join(sorted(endings)) + "; or the dialect given",
+            ", ".join(sorted(endings)),
+            remedy="Name the format.",
         )
     wanted = name or endings[target.suffix.lower()]
     found = next((each for each in dialects if each.name == wanted), None)
     if found is None:
-        raise BadRequest("unknown dialect", wanted, tuple(each.name for each in dialects))
+        raise BadRequest("unknown format", wanted, tuple(each.name for each in dialects))
     return found

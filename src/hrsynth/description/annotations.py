@@ -1,4 +1,5 @@
-"""What our writers add to foreign files, and reading takes back: platform, camera, observed directions, the base."""
+"""Annotations that the writers add to foreign files and the readers take back: platform, camera, observed directions,
+base."""
 
 from __future__ import annotations
 
@@ -22,12 +23,12 @@ from .observation_text import attributes_of, spec_of
 NAMESPACE = "urn:hrsynth"
 PREFIX = "hrsynth"
 IMAGE = ("focal", "width", "height")
-"""What is said of a camera's pictures."""
+"""Attributes of a camera's image."""
 
 
 def drop_world(graph: JointGraph) -> JointGraph:
-    """The graph, based on the one link that a fixed joint holds in the world where nothing else hangs on the world, or
-    only free joints do, which then hang on that link."""
+    """Return the graph based on the only link that a fixed joint holds in the world, if nothing else or only free
+    joints hang on the world; these then hang on that link."""
     at_world = [joint for joint in graph.joints.values() if graph.base in joint.links]
     welds = [joint for joint in at_world if joint.type is JointType.FIXED]
     floating = [joint for joint in at_world if joint.type is JointType.FREE]
@@ -47,7 +48,7 @@ def drop_world(graph: JointGraph) -> JointGraph:
 
 
 def read_annotation(graph: JointGraph, key: str, text: str) -> str | None:
-    """Take back one annotation; what is wrong with it, or None."""
+    """Read one annotation; return its error, or None."""
     words = [unquote(word) for word in text.split()]
     if key in ("platform", "formation", "camera") and len(words) == 1:
         if words[0] not in graph.links:
@@ -80,7 +81,7 @@ def read_annotation(graph: JointGraph, key: str, text: str) -> str | None:
         except (BadRequest, KeyError, ValueError) as error:
             return str(error)
     else:
-        return "unknown saying"
+        return "unknown hrsynth annotation"
     return None
 
 
@@ -92,7 +93,7 @@ def _camera(said: dict[str, str]) -> NamedCamera:
 
 
 def annotations_of(robot: Mechanism, *, motors: bool = False) -> Iterable[tuple[str, str]]:
-    """Key and text of all that is added for a robot, in order."""
+    """Yield key and text of all annotations of a robot, in order."""
     if not robot.open_platform:
         yield "formation" if robot.formation else "platform", quote(robot.platform)
     if robot.turns is not None:
@@ -112,7 +113,7 @@ def annotations_of(robot: Mechanism, *, motors: bool = False) -> Iterable[tuple[
 
 
 def camera_attributes(camera: NamedCamera, decimals: int) -> dict[str, str]:
-    """All that is said of a camera, by name."""
+    """Return the attributes of a camera by name."""
     image = {key: numerals.exact(value) for key in IMAGE if (value := getattr(camera, key)) is not None}
     return {"name": camera.name, "link": camera.link, **numerals.origin(camera.pose, decimals)[1], **image}
 

@@ -1,4 +1,4 @@
-"""Joints of several freedoms in a tree of one-freedom joints: N is N__1, N__2, N__3 through bare links of their own.
+"""Joints with several dof in a tree of one-dof joints: N is N__1, N__2, N__3 through bare links.
 
 | joint | chain                                   |
 | ----- | --------------------------------------- |
@@ -27,38 +27,39 @@ from ..tolerances import SAME_DIRECTION, SAME_POINT
 
 TIP = "__tip"
 BODY = "__body"
-"""What follows the name of a link of a chain where joints and links may not share a name (SDFormat)."""
+"""Suffix of the link of a chain where joints and links may not share a name (SDFormat)."""
 CUT, WELD, END, SECOND = "__cut", "__weld", "__end", "__second"
-"""Ends of the names of what writers of foreign dialects add for a loop N: the link that one half of the cut joint
+"""Suffixes of the names that writers of foreign formats add for a loop N: the link that one half of the cut joint
 carries, the closure in all six directions, the frame on the other link, the second point of a revolute joint."""
 WHOLES = {"RR": JointType.UNIVERSAL, "RRR": JointType.SPHERICAL, "PR": JointType.CYLINDRICAL, "PPR": JointType.PLANAR}
-"""The joint that joints of these types in a row may be."""
+"""Joint types that joints of these types in a row can form."""
 _FIRST = re.compile(r"(?P<name>.+)__1", re.DOTALL)
 _R, _P = JointType.REVOLUTE, JointType.PRISMATIC
 
 
 def part(name: str, number: int) -> str:
-    """The name of the ``number``-th joint (and of the link that it carries, but for BODY) of the chain of ``name``."""
+    """Return the name of the ``number``-th joint (and, with BODY, of the link that it carries) of the chain of
+    ``name``."""
     return f"{name}__{number}"
 
 
 def part_names(name: str, count: int) -> list[str]:
-    """The names of the joints that a joint (or its motors) is written as: its own where it is one."""
+    """Return the names of the joints that a joint (or its motors) is written as: its name if it is one."""
     return [name] if count <= 1 else [part(name, number + 1) for number in range(count)]
 
 
 def require_free(name: str, joint: Joint, *taken: Container[str]) -> None:
-    """Raise ``BadRequest`` where what a joint is written as would take the name of another part."""
+    """Raise ``BadRequest`` if a name of a written joint is already taken."""
     if any(name in each for each in taken):
         raise BadRequest(
-            f"a part of joint {joint.name!r}, as it is written, would take the name of another",
+            f"a part of joint {joint.name!r} would get a name that is taken",
             name,
-            "another name of that one",
+            "another name for that part",
         )
 
 
 def merge(mechanism: Mechanism) -> Mechanism:
-    """The mechanism with every chain and every tip merged into one joint; what only looks like one stays as it is."""
+    """Return the mechanism with every chain and tip merged into one joint; chains that do not fit exactly stay."""
     links, joints = dict(mechanism.links), dict(mechanism.joints)
     busy = {mechanism.base, mechanism.platform, mechanism.reference}
     busy |= {link for o in mechanism.observations for link in (o.link, o.seen_from) if link is not None}
@@ -114,7 +115,7 @@ def merge(mechanism: Mechanism) -> Mechanism:
 
 
 def _whole(name: str, chain: list[Joint], between: list[Link | None], length: float) -> Joint | None:
-    """The joint that a chain is, or None where it is none by its links, geometry, motors or limits."""
+    """Return the joint that a chain forms, or None if its links, geometry, motors or limits do not fit."""
     first = chain[0]
     for number, (before, after) in enumerate(pairwise(chain), 1):
         own = part(name, number)
@@ -159,7 +160,7 @@ def _whole(name: str, chain: list[Joint], between: list[Link | None], length: fl
 
 
 def _offset(kind: JointType, chain: list[Joint]) -> Array | None:
-    """Where the file counts the whole from: of turns about a ball's centre, and of planes, that is not kept."""
+    """Return the offset from which the file counts the whole joint; not kept for spherical and planar joints."""
     if kind not in (JointType.UNIVERSAL, JointType.CYLINDRICAL) or all(joint.offset is None for joint in chain):
         return None
     return np.concatenate([np.zeros(1) if joint.offset is None else joint.offset for joint in chain])

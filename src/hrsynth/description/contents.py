@@ -1,7 +1,7 @@
-"""What links hold beside their kinematics: masses, inertias and shapes, told between dialects.
+"""Masses, inertias and shapes of links, carried from one format to another.
 
-A mechanism keeps them as the child elements of URDF's ``<link>``; other dialects read them into these elements and
-write what :func:`content_of` finds in them. Metres, kilograms, radians; all poses are in the link's frame.
+A mechanism keeps them as the child elements of URDF's ``<link>``; other formats are read into these elements and
+written from what :func:`content_of` returns. Metres, kilograms, radians; all poses are in the link's frame.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ SIZES = {
     "capsule": ("radius", "length"),
     "mesh": (),
 }
-"""The attributes of each kind of shape; cylinders and capsules lie along z, a capsule's length is without its caps."""
+"""Attributes of each kind of shape. Cylinders and capsules lie along z; a capsule's length excludes its caps."""
 SHAPES = ("visual", "collision")
 INERTIA = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
 @dataclass(frozen=True, eq=False)
 class Inertial:
-    """A mass, the pose of its centre (4, 4), and its inertia (3, 3) in that frame; None where it has none."""
+    """Mass, pose of its centre (4, 4), and inertia (3, 3) in that frame; None if absent."""
 
     mass: float
     X: Array = field(default_factory=lambda: ORIGIN)
@@ -39,7 +39,7 @@ class Inertial:
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """A shape: its kind with its sizes, or the file of a mesh with its scale; ``role`` is visual or collision."""
+    """Shape: its kind with its sizes, or the file of a mesh with its scale; ``role`` is visual or collision."""
 
     kind: str
     sizes: tuple[float, ...] = ()
@@ -53,7 +53,7 @@ class Solid:
 
 @dataclass(frozen=True)
 class Content:
-    """All of it; ``rest`` are the elements that say something else."""
+    """Content of a link; ``rest`` has the elements that are not read."""
 
     inertial: Inertial | None = None
     solids: tuple[Solid, ...] = ()
@@ -61,7 +61,8 @@ class Content:
 
 
 def scaled_shapes(link: Link, factor: float) -> Link:
-    """The link with the lengths of its shapes and of its mass's place multiplied; what is no number stays."""
+    """Return the link with the lengths of its shapes and of its centre of mass scaled; attributes that are not numbers
+    stay."""
     found = []
     for text in link.xml:
         if not text.startswith(tuple(f"<{tag}" for tag in (*SHAPES, "inertial"))):
@@ -82,7 +83,7 @@ def scaled_shapes(link: Link, factor: float) -> Link:
 
 
 def content_of(link: Link, robot: Mechanism) -> Content:
-    """What a link of a robot holds; a colour may be named by a ``<material>`` of the robot."""
+    """Return the content of a link; a colour may be named by a ``<material>`` of the robot."""
     if not link.xml:
         return Content()
     colours = {
@@ -149,17 +150,17 @@ def _solid(element: xml.Element, colours: Mapping[str, tuple[float, ...]]) -> So
     if kind == "mesh":
         scale = tuple(float(v) for v in _numbers(shape, "scale", (1, 1, 1)))
         if not shape.get("filename"):
-            raise ValueError("a file name")
+            raise ValueError("the file of a mesh")
         return Solid(kind, (), place, role, element.get("name"), colour, shape.get("filename"), scale)
     count = 3 if kind == "box" else 1
     sizes = tuple(float(v) for key in SIZES[kind] for v in _numbers(shape, key, (0,) * count))
     if not all(size > 0 for size in sizes):
-        raise ValueError("sizes above zero")
+        raise ValueError("sizes above 0")
     return Solid(kind, sizes, place, role, element.get("name"), colour)
 
 
 def fragments(content: Content) -> tuple[str, ...]:
-    """The same as child elements of URDF's ``<link>``, each as text."""
+    """Return the content as child elements of URDF's ``<link>``, each as text."""
     found = []
     if content.inertial is not None:
         mass, tensor = content.inertial.mass, content.inertial.inertia
@@ -199,7 +200,8 @@ def _origin(X: Array) -> list[xml.Element]:
 
 
 def principal(inertia: Array) -> tuple[Array, Array]:
-    """The principal moments (3,) of an inertia and the rotation (3, 3) of their frame, the least turned one."""
+    """Return the principal moments (3,) of an inertia and the rotation (3, 3) of their frame, with the smallest
+    angle."""
     if not np.any(inertia - np.diag(np.diag(inertia))):
         return np.diag(inertia), np.eye(3)
     moments, R = np.linalg.eigh(inertia)
@@ -213,14 +215,14 @@ def principal(inertia: Array) -> tuple[Array, Array]:
 
 
 def along_z(direction: Array) -> Array:
-    """A rotation (3, 3) that takes z to a direction."""
+    """Return a rotation (3, 3) that takes z to a direction."""
     z = unit(direction)
     x = unit(np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.9 else [1.0, 0.0, 0.0], z))
     return np.column_stack((x, np.cross(z, x), z))
 
 
 def unsaid(robot: Mechanism, kinds: Collection[str], *, dialect: str) -> list[Note]:
-    """A note of all the content that a dialect has no words for; ``kinds`` are the shapes that it has (none: no masses
+    """Yield a note of all content that a format cannot hold; ``kinds`` are the shapes that it has (none: no masses
     either)."""
     found = []
     contents = {name: content_of(link, robot) for name, link in robot.links.items()}
@@ -239,7 +241,7 @@ def unsaid(robot: Mechanism, kinds: Collection[str], *, dialect: str) -> list[No
         links = [name for name, content in contents.items() if any(solid.kind == kind for solid in content.solids)]
         if links:
             found.append(f"the {kind} shapes of {comma_list(links)}")
-    return [Note("warning", f"{dialect} has no place for these, which are lost: {'; '.join(found)}")] if found else []
+    return [Note("warning", f"{dialect} cannot hold these, which are lost: {'; '.join(found)}")] if found else []
 
 
 def _tag(fragment: str) -> str:

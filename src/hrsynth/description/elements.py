@@ -1,4 +1,4 @@
-"""Elements of robot files read one by one: what is wrong with them is collected, with its line."""
+"""Elements of robot files, read one by one; their defects are collected with their lines."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from .jointgraph import ORIGIN, Z
 
 LIMITS = ("lower", "upper", "velocity", "effort")
 TURNS: dict[str, bool | None] = {"true": True, "false": False}
-"""What a platform's ``turns`` may say."""
+"""Values of a platform's ``turns``."""
 
 
 @dataclass
 class XmlReader:
-    """A document and its defects; every reader of an XML dialect is one."""
+    """Document and its defects; base of the readers of all XML formats."""
 
     file: str
     root: xml.Element
@@ -31,8 +31,8 @@ class XmlReader:
     digits: numerals.Digits = field(default_factory=numerals.Digits)
 
     def defect(self, line: int | None, what: str, value: str | None = None, allowed: str | None = None) -> None:
-        """Record what is wrong in a line of the file (or of one that it includes); raises ``BadRobotFile`` where that
-        is enough."""
+        """Record a defect in a line of the file (or of an included one). Raises ``BadRobotFile`` at the limit of
+        defects."""
         if value is not None and len(value) > 80:
             value = value[:77] + "..."
         file = line.file if isinstance(line, xml.SourceLine) else self.file
@@ -41,7 +41,7 @@ class XmlReader:
             self.require_sound()
 
     def require_sound(self) -> None:
-        """Raise :class:`BadRobotFile` with all defects found so far, where there are any."""
+        """Raise :class:`BadRobotFile` with all defects found so far, if any."""
         if self.defects:
             raise BadRobotFile(self.defects)
 
@@ -52,11 +52,11 @@ class XmlReader:
                 xml.line(element),
                 f"no {what}",
                 None,
-                f"{what} and joints; where this file is a part or holds macros, the file that uses it",
+                f"{what} and joints; for a file of parts or macros, the file that includes it",
             )
 
     def attribute(self, element: xml.Element, name: str) -> str | None:
-        """An attribute that must be there and not be empty."""
+        """Return a required, non-empty attribute."""
         value = element.get(name)
         if value is None or not value.strip():
             self.defect(xml.line(element), f"<{element.tag}> without {name}")
@@ -64,7 +64,7 @@ class XmlReader:
         return value
 
     def values(self, text: str | None, default: Iterable[float], line: int | None, what: str) -> Array:
-        """The numbers of a text, as many as the default has; the default where there is none, or it is not right."""
+        """Return the numbers of a text, as many as the default has; the default if the text is absent or wrong."""
         fallback = np.array(list(default), dtype=float)
         if text is None:
             return fallback
@@ -77,18 +77,18 @@ class XmlReader:
             return fallback
 
     def numbers(self, element: xml.Element, name: str, default: Iterable[float]) -> Array:
-        """The numbers of an attribute."""
+        """Return the numbers of an attribute."""
         return self.values(element.get(name), default, xml.line(element), f"{name} of <{element.tag}>")
 
     def only(self, element: xml.Element, tag: str) -> xml.Element | None:
-        """The child element of that name; a second one is a defect."""
+        """Return the child element of that name; a second one is a defect."""
         found = element.findall(tag)
         for extra in found[1:]:
             self.defect(xml.line(extra), f"second <{tag}> in <{element.tag}>", element.get("name"))
         return found[0] if found else None
 
     def pose(self, element: xml.Element | None) -> Array:
-        """The pose (4, 4) that the attributes ``xyz`` and ``rpy`` of an element give."""
+        """Return the pose (4, 4) of the attributes ``xyz`` and ``rpy``."""
         if element is None:
             return ORIGIN
         angles = self.numbers(element, "rpy", (0, 0, 0))
@@ -96,11 +96,11 @@ class XmlReader:
         return numerals.from_origin(self.numbers(element, "xyz", (0, 0, 0)), angles)
 
     def origin(self, element: xml.Element) -> Array:
-        """The pose that the ``<origin>`` of an element gives."""
+        """Return the pose of the ``<origin>`` of an element."""
         return self.pose(self.only(element, "origin"))
 
     def unit(self, values: Array, line: int | None, what: str, given: str | None = None, default: Array = Z) -> Array:
-        """The unit vector along ``values``; a zero vector is a defect."""
+        """Return the unit vector along ``values``; a zero vector is a defect."""
         if (size := float(np.linalg.norm(values))) > WITHOUT_DIRECTION:
             self.digits.length(size)
             return unit(values)
@@ -108,7 +108,7 @@ class XmlReader:
         return default
 
     def direction(self, element: xml.Element, name: str, default: Iterable[float]) -> Array:
-        """The unit vector that an attribute gives."""
+        """Return the unit vector of an attribute."""
         return self.unit(
             self.numbers(element, name, default),
             xml.line(element),
@@ -118,7 +118,7 @@ class XmlReader:
         )
 
     def rotation(self, element: xml.Element, quaternion: Array) -> Array:
-        """The rotation (3, 3) of a quaternion w x y z of any length but zero."""
+        """Return the rotation (3, 3) of a quaternion w x y z of any length but zero."""
         size = float(np.linalg.norm(quaternion))
         if not size > WITHOUT_DIRECTION:
             self.defect(xml.line(element), "a quaternion of length zero")
@@ -127,7 +127,7 @@ class XmlReader:
         return rotation_of(quaternion / size)
 
     def axes(self, element: xml.Element, type_: JointType | None) -> tuple[Array, ...]:
-        """The axes that the type needs, unit vectors; axes of types that need none are not looked at."""
+        """Return the axes that the type needs, as unit vectors."""
         axes = []
         for tag in ("axis", "axis2")[: 0 if type_ is None else type_.axes]:
             axis = self.only(element, tag)
@@ -138,7 +138,7 @@ class XmlReader:
 
 
 def sound_limits(text_of: Callable[[str], str | None], *, bounded: bool = True) -> Limits | None:
-    """The limits that are numbers in order; anything else is no limit. ``bounded``: whether there may be bounds."""
+    """Return the limits if they are numbers in order, else no limits. ``bounded``: bounds are allowed."""
     values: dict[str, float] = {}
     for key in LIMITS:
         try:

@@ -1,4 +1,4 @@
-"""The robots of the package example-robot-data by name, ``example:cassie``: URDF and SDF files, nothing is imported."""
+"""Robots of the package example-robot-data by name, ``example:cassie``: URDF and SDF files; nothing is imported."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ FOLDER = f"cmeel.prefix/share/{PACKAGE}/robots"
 
 
 def list_examples() -> dict[str, Path]:
-    """Name to file, sorted by name: the file's, with the folder's before it where several files have one name.
+    """Return the robots of example-robot-data: name to file, sorted by name. Files of one name get the folder's name
+    before theirs.
 
     >>> robots = hrsynth.list_examples()
     """

@@ -1,4 +1,4 @@
-"""What a dialect of robot files is: a folder of ``formats/`` that says how its files are known, read and written."""
+"""File format of robots: a folder of ``formats/`` that states how its files are recognised, read and written."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ from .jointgraph import JointGraph
 
 @dataclass(frozen=True, eq=False)
 class RobotFile:
-    """A file that was opened: its place, its document (None where it is no XML), whether what it says of itself stands,
-    as nothing was given that changes it, what it begins with, and what was left out of its text; up to what
-    ``tolerance`` relations of its joints are made exact (None: as its digits say), or that they stay ``as_written``;
-    whether mistyped names are let pass (``as_spelt``)."""
+    """Opened file: path, document (None if it is not XML), first bytes, and notes on text that was left out.
+    ``strict``: no override is given, so the file must be complete; ``tolerance``: relations of joints up to it are made
+    exact (None: by the file's digits); ``as_written``: none is; ``as_spelt``: mistyped names pass."""
 
     path: Path
     root: xml.Element | None
@@ -30,29 +29,29 @@ class RobotFile:
 
     @property
     def document(self) -> xml.Element:
-        """The root element; raises ``BadRobotFile`` for what is no XML."""
+        """Return the root element. Raises ``BadRobotFile`` if the file is not XML."""
         return xml.document(xml.content(self.path), str(self.path)) if self.root is None else self.root
 
     @property
     def tag(self) -> str | None:
-        """The name of the root element."""
+        """Name of the root element."""
         return None if self.root is None else str(self.root.tag)
 
     def has(self, tag: str) -> bool:
-        """Whether the root has a child element of that name."""
+        """Return True if the root has a child element of that name."""
         return self.root is not None and self.root.find(tag) is not None
 
 
 @dataclass(frozen=True)
 class Written:
-    """What a dialect makes of a mechanism: the text of each file, and warnings of what it cannot say."""
+    """Output of a writer: the text of each file, and warnings of what the format cannot express."""
 
     texts: tuple[str, ...]
     lost: tuple[Note, ...] = ()
 
 
 class Read(Protocol):
-    """``read`` in ``read.py``: a joint graph, of which the rest is made as for all dialects, or a mechanism."""
+    """``read`` in ``read.py``: return a joint graph, assembled as in all formats, or a mechanism."""
 
     def __call__(self, file: RobotFile) -> JointGraph | Mechanism: ...
 
@@ -64,29 +63,29 @@ class Write(Protocol):
 
 
 def as_text(text: str, path: Path) -> bytes:
-    """The bytes of a dialect whose files are text."""
+    """Return the bytes of a file that is text."""
     return text.encode()
 
 
 def one_file(path: Path) -> tuple[Path, ...]:
-    """The files of a dialect that writes one."""
+    """Return the files of a format that writes one."""
     return (path,)
 
 
 def alone(path: Path) -> Path | None:
-    """No other file is read together with one."""
+    """Return None: no other file is read together with this one."""
     return None
 
 
 @dataclass(frozen=True)
 class FileFormat:
-    """A dialect's name (that of its folder), how its files are known by their content, and the endings of those that it
-    writes: none where it is only read. ``files`` are all that are written where one is named, the robot first;
-    ``packed`` makes the bytes of a file of its text. ``begins`` is what its files begin with where they are no XML,
-    ``meshes`` the endings of the meshes that it can name, None where any. ``partner`` is the file on the disk that is
-    read together with one.
+    """Name of a format (its folder's), how its files are recognised by their content, and the extensions of the files
+    that it writes (none: it is only read). ``files`` are all files written where one is named, the robot first;
+    ``packed`` turns the text of a file into bytes. ``begins`` are the first bytes of files that are not XML, ``meshes``
+    the extensions of meshes that it can name (None: any). ``partner`` is the file on the disk that is read together
+    with one.
 
-    A file is of the first dialect that knows it, in the order of ``rank``.
+    A file has the first format that recognises it, in the order of ``rank``.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""What a robot file says before anything is put together: links, and joints with a frame on each of their two links."""
+"""Joint graph of a robot file before assembly: links, and joints with a frame on each of their two links."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ LOOP_TYPES = {
     "planar": JointType.PLANAR,
     "fixed": JointType.FIXED,
 }
-"""The names that a ``<loop>`` has for joint types."""
+"""Names of joint types in a ``<loop>``."""
 
 _COST = {
     JointType.FIXED: 0,
@@ -48,7 +48,7 @@ _OUTSIDE = 20
 
 @dataclass(frozen=True, eq=False)
 class FrameSpec:
-    """A joint's frame on one of its links: the link, the frame's pose in it (4, 4), the line."""
+    """Joint frame on one of its links: the link, the frame's pose in it (4, 4), the line."""
 
     link: str | None
     X: Array = field(default_factory=lambda: ORIGIN)
@@ -57,8 +57,8 @@ class FrameSpec:
 
 @dataclass(frozen=True, eq=False)
 class JointSpec:
-    """A joint as a file gives it; ``type`` None for an unknown type. The first axis is fixed in the predecessor's joint
-    frame (R, P, C, E: the same vector in both), the second (U) in the successor's."""
+    """Joint as a file gives it; ``type`` None if unknown. The first axis is fixed in the predecessor's joint frame (R,
+    P, C, E: the same vector in both), the second (U) in the successor's."""
 
     name: str
     type: JointType | None
@@ -72,7 +72,7 @@ class JointSpec:
 
     @property
     def kind(self) -> JointType:
-        """The type; a joint without one was a defect, so a whole graph has none."""
+        """Type of the joint; a joint without one is a defect, so a complete graph has none."""
         return self.type or JointType.FIXED
 
     @cached_property
@@ -82,7 +82,7 @@ class JointSpec:
 
     @cached_property
     def parts(self) -> list[tuple[Array, Array | None]]:
-        """Of each one-freedom joint that it is a chain of the axis a, and [a]ₓ where it turns about that."""
+        """Axis a of each one-dof joint of the equivalent chain, and [a]ₓ if it rotates about a, else None."""
         return [
             (axis, None if kind is JointType.PRISMATIC else hat(unit(axis)))
             for kind, axis in elementary(self.kind, self.axes)
@@ -94,14 +94,14 @@ class JointSpec:
         return plane_axes(self.axes[0])
 
     def frames(self, poses: Mapping[str, Array]) -> tuple[Array, Array]:
-        """The poses (4, 4) of both joint frames, where the links have ``poses``."""
+        """Return the poses (4, 4) of both joint frames for the links' ``poses``."""
         one, two = self.ends
         return poses[str(one.link)] @ one.X, poses[str(two.link)] @ two.X
 
 
 @dataclass(frozen=True)
 class CouplingSpec:
-    """A coupling as a file gives it: coordinate of joint ``driven`` = ratio × that of ``driver`` + offset."""
+    """Coupling as a file gives it: coordinate of joint ``driven`` = ratio × that of ``driver`` + offset."""
 
     name: str
     driver: str
@@ -112,14 +112,14 @@ class CouplingSpec:
 
 
 Posture = Mapping[str, Array]
-"""The values of some joints, by name, as :mod:`.jointmotion` has them; all others are at zero."""
+"""Values of some joints, by name, as in :mod:`.jointmotion`; all others are at zero."""
 
 
 def first_body(
     links: Iterable[str], joined: Iterable[tuple[str, str]], base: str, told: Iterable[str]
 ) -> tuple[str | None, int]:
-    """The first body of a formation: of the links ``told`` to be observed or to observe, where two or more of the parts
-    that nothing but the base joins have some; and the number of such parts."""
+    """Return the first body of a formation and the number of its parts. A formation has two or more parts, joined only
+    by the base, with links that observe or are observed (``told``)."""
     some = set(told) - {base}
     names = [name for name in links if name != base]
     parts = graphs.components(graphs.adjacency(names, (pair for pair in joined if base not in pair)))
@@ -129,7 +129,7 @@ def first_body(
 
 @dataclass
 class JointGraph:
-    """What a foreign file says; with every tree joint at zero its frames on both links coincide."""
+    """Content of a foreign file. With every tree joint at zero its frames on both links coincide."""
 
     name: str
     file: str
@@ -140,43 +140,43 @@ class JointGraph:
     base: str | None = None
     platform: str | None = None
     formation: bool = False
-    """Whether the platform is only the first of the bodies that are controlled."""
+    """The platform is only the first of the controlled bodies."""
     turns: bool | None = None
-    """Whether the platform's turn counts; None: by the joints."""
+    """The platform's rotation is controlled; None: decided by the joints."""
     camera: str | None = None
     observations: list[Direction] = field(default_factory=list)
     sights: list[ObservationSpec] = field(default_factory=list)
-    """Observations of other kinds, or by cameras that have a name."""
+    """Observations of other kinds, or by named cameras."""
     cameras: list[NamedCamera] = field(default_factory=list)
     rest: list[str] = field(default_factory=list)
     notes: list[Note] = field(default_factory=list)
     digits: Digits = field(default_factory=Digits)
     closing: set[str] = field(default_factory=set)
-    """Frames that only tell where a loop closes."""
+    """Frames that only mark where a loop closes."""
     assumed: dict[str, list[str]] = field(default_factory=dict)
-    """Guesses of one kind about many joints: what, and which."""
+    """Assumptions of one kind about many joints: the text, and the joints."""
     postures: dict[str, Posture] = field(default_factory=dict)
-    """Postures that the file names."""
+    """Keyframes of the file."""
     unit: float = 1.0
-    """Metres in the file's unit of length, in which postures stay."""
+    """Metres in the file's unit of length, which keyframes keep."""
 
     def note(self, kind: str, text: str, *, base: bool = False) -> None:
-        """Record what the file does not say; of the ``base``, which link is taken for it."""
+        """Record what reading assumed, solved or ignored; ``base``: it is about the choice of the base."""
         self.notes.append(Note(kind, text, base))
 
     def note_assumed(self) -> None:
-        """Record the guesses about many joints, one note a kind."""
+        """Record the assumptions about many joints, one note for each kind."""
         for what, names in self.assumed.items():
-            self.note("guess", f"{what}: {comma_list(names)}")
+            self.note("assumption", f"{what}: {comma_list(names)}")
         self.assumed.clear()
 
     def fresh(self, name: str) -> str:
-        """``name``, or ``name_2``, ``name_3`` … if it is taken."""
+        """Return ``name``, or ``name_2``, ``name_3`` … if it is taken."""
         return fresh_name(name, self.links, self.joints)
 
     @property
     def named(self) -> tuple[set[str | None], set[str]]:
-        """The links and the joints that the file names for more than where they hang."""
+        """Links and joints that the file names for more than their place in the tree."""
         links = {self.base, self.platform, self.camera, *(each.link for each in self.cameras)}
         links |= {name for each in self.observations for name in (each.link, each.seen_from)}
         joints = {name for gear in self.gears for name in (gear.driver, gear.driven)}
@@ -192,20 +192,20 @@ class JointGraph:
         line: int | None = None,
         motor: Motor | None = None,
     ) -> None:
-        """Add a joint that closes a loop; of ``axes`` it takes as many as its type has."""
+        """Add a joint that closes a loop, with as many of ``axes`` as its type has."""
         self.joints[name] = JointSpec(name, kind, ends, tuple(axes[: kind.axes]), None, (), line, motor, in_tree=False)
 
     def follow(self, gears: Iterable[CouplingSpec]) -> None:
-        """Add what mimics say, once all joints are known: a joint of one freedom follows another."""
+        """Add the couplings of ``<mimic>``, once all joints are known: one R or P joint follows another."""
         for gear in gears:
             ends = [self.joints.get(name) for name in (gear.driver, gear.driven)]
             if all(joint is not None and joint.type in (JointType.REVOLUTE, JointType.PRISMATIC) for joint in ends):
                 self.gears.append(replace(gear, name=self.fresh(gear.name)))
             elif ends[0] is None:
-                self.note("ignored", f"the mimic of joint {gear.driven!r}: there is no joint {gear.driver!r}")
+                self.note("ignored", f"the mimic of joint {gear.driven!r}, as there is no joint {gear.driver!r}")
 
     def scale(self, factor: float) -> None:
-        """Multiply all lengths: frames on links, limits and gears of slides."""
+        """Scale all lengths: frames on links, limits and couplings of prismatic joints."""
         self.unit *= factor
         slides = {name for name, joint in self.joints.items() if joint.type is JointType.PRISMATIC}
         for name, joint in self.joints.items():
@@ -237,7 +237,7 @@ class JointGraph:
         ]
 
     def in_metres(self, posture: Posture) -> Posture:
-        """A posture of the file with its lengths in metres."""
+        """Return a keyframe of the file with its lengths in metres."""
         if self.unit == 1:
             return posture
         slides = (JointType.PRISMATIC, JointType.FREE)
@@ -251,7 +251,7 @@ class JointGraph:
         }
 
     def prune(self, base: str) -> None:
-        """Leave out what no chain of joints joins to ``base``, and record it."""
+        """Remove links that no chain of joints connects to ``base``, and record them."""
         kept = graphs.component(graphs.adjacency(self.links, (joint.links for joint in self.joints.values())), base)
         lost = [link for link in self.links if link not in kept]
         if lost:
@@ -263,7 +263,7 @@ class JointGraph:
 
 
 def comma_list(names: Iterable[str], most: int = 8, like: str | None = None) -> str:
-    """Names set apart by commas, the first of many; those most ``like`` a text come first."""
+    """Return names separated by commas, the first ones of many; those most ``like`` a text come first."""
     every = list(names)
     if like is not None:
         close = difflib.get_close_matches(like, every, n=most)
@@ -272,7 +272,7 @@ def comma_list(names: Iterable[str], most: int = 8, like: str | None = None) -> 
 
 
 def scale_pose(X: Array, factor: float) -> Array:
-    """A pose (4, 4) with its translation multiplied."""
+    """Return a pose (4, 4) with its translation scaled."""
     if X is ORIGIN:
         return X
     larger = X.copy()
@@ -281,12 +281,12 @@ def scale_pose(X: Array, factor: float) -> Array:
 
 
 TreeJoint = tuple[JointSpec, str, str]
-"""A joint of a tree, the link nearer to the base, the link that it carries."""
+"""Joint of a tree, the link nearer to the base, the link that it carries."""
 
 
 def spanning_tree(base: str, joints: Iterable[JointSpec]) -> list[TreeJoint]:
-    """The joints of a tree that hangs on ``base``, parents first; those that the file writes as tree joints before
-    others, few freedoms before many."""
+    """Return the joints of a tree rooted at ``base``, parents first; tree joints of the file come before others, joints
+    with fewer dof before joints with more."""
     bonds = list(joints)
     links = dict.fromkeys([base, *(link for joint in bonds for link in joint.links)])
     weights = [_COST[joint.kind] + (0 if joint.in_tree else _OUTSIDE) for joint in bonds]
@@ -294,7 +294,7 @@ def spanning_tree(base: str, joints: Iterable[JointSpec]) -> list[TreeJoint]:
 
 
 def zero_poses(base: str, tree: Iterable[TreeJoint]) -> dict[str, Array]:
-    """The poses (4, 4) of a tree's links in the base frame, all joints at zero: their two frames coincide."""
+    """Return the poses (4, 4) of a tree's links in the base frame, all joints at zero: their two frames coincide."""
     X = {base: ORIGIN}
     for joint, parent, child in tree:
         near, far = joint.ends if joint.links[0] == parent else joint.ends[::-1]

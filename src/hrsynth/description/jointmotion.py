@@ -1,4 +1,4 @@
-"""What a joint does: the displacement between its two frames, its screws, and what is left where a loop is open.
+"""Motion of a joint: displacement between its two frames, its screws, and the closure residual of a loop.
 
 A *value* holds a joint's coordinates: an array for R, P, U, C, E, the displacement (4, 4) itself for S and free joints.
 """
@@ -21,12 +21,12 @@ _MATRIX = (JointType.SPHERICAL, JointType.FREE)
 
 
 def zero(joint: JointSpec) -> Array:
-    """The value at which both frames coincide."""
+    """Return the value at which both frames coincide."""
     return np.eye(4) if joint.kind in _MATRIX else np.zeros(joint.kind.freedoms)
 
 
 def displacement(joint: JointSpec, value: Array) -> Array:
-    """The pose (4, 4) of the successor's joint frame in the predecessor's: of one freedom after the other."""
+    """Return the pose (4, 4) of the successor's joint frame in the predecessor's, one motion after the other."""
     if joint.kind in _MATRIX:
         return value
     found = None
@@ -41,7 +41,7 @@ def displacement(joint: JointSpec, value: Array) -> Array:
 
 
 def step_along(joint: JointSpec, value: Array, step: Array, R_predecessor: Array) -> Array:
-    """The value after a step along the screws of :func:`screws`."""
+    """Return the value after a step along the screws of :func:`screws`."""
     if joint.kind not in _MATRIX:
         return value + step
     angular = R_predecessor.T @ step[-3:]
@@ -50,8 +50,8 @@ def step_along(joint: JointSpec, value: Array, step: Array, R_predecessor: Array
 
 
 def screws(joint: JointSpec, X_P: Array, X_S: Array) -> list[Array]:
-    """The twists (linear at the base origin, angular) of the successor relative to the predecessor, one a coordinate;
-    ``X_P`` and ``X_S`` are the poses of the joint's two frames."""
+    """Return the twists (linear at the base origin, angular) of the successor relative to the predecessor, one for each
+    coordinate; ``X_P`` and ``X_S`` are the poses of the joint's two frames."""
     found = []
     for number, (axis, K) in enumerate(joint.parts):
         if joint.kind not in _MATRIX:
@@ -61,14 +61,14 @@ def screws(joint: JointSpec, X_P: Array, X_S: Array) -> list[Array]:
 
 
 def opening(joint: JointSpec, X_P: Array, X_S: Array) -> tuple[Array, Array]:
-    """By how much a joint's two frames miss each other, (6 − freedoms,), and its derivative by the twist of the
-    successor relative to the predecessor, (6 − freedoms, 6)."""
+    """Return the closure residual of a joint's two frames, (6 − dof,), and its derivative by the twist of the successor
+    relative to the predecessor, (6 − dof, 6)."""
     gap, turn, rows = _misses(joint, X_P, X_S)
     return np.concatenate([gap, turn]), rows
 
 
 def _misses(joint: JointSpec, X_P: Array, X_S: Array) -> tuple[Array, Array, Array]:
-    """The gap and the turn that the joint does not leave free, and the derivative of both."""
+    """Return the distance and the rotation that the joint does not allow, and the derivative of both."""
     kind = joint.kind
     if kind is JointType.FREE:
         return np.zeros(0), np.zeros(0), np.zeros((0, 6))
@@ -97,13 +97,14 @@ def _misses(joint: JointSpec, X_P: Array, X_S: Array) -> tuple[Array, Array, Arr
 
 
 def _beyond(turn: Array) -> Array:
-    """The error of an axis that points the opposite way: it grows with the angle, as it does on the near side."""
+    """Return the error of an axis that points the opposite way: it grows with the angle, as it does on the near
+    side."""
     size = float(np.linalg.norm(turn))
     return turn * ((2 - size) / size) if size > WITHOUT_DIRECTION else np.array([2.0, 0.0])
 
 
 def residual(joint: JointSpec, X_P: Array, X_S: Array, length: float) -> float:
-    """By how much a loop misses: the larger of the gap (divided by ``length``) and the angle (radians)."""
+    """Return the closure residual of a loop: the larger of the distance (divided by ``length``) and the angle (rad)."""
     gap, turn, _ = _misses(joint, X_P, X_S)
     angle = float(np.linalg.norm(turn))
     if joint.kind is JointType.UNIVERSAL:
@@ -114,8 +115,8 @@ def residual(joint: JointSpec, X_P: Array, X_S: Array, length: float) -> float:
 
 
 def require_closed(robot: str, loops: Sequence[tuple[JointSpec, Array, Array]], length: float) -> None:
-    """Raise :class:`LoopsNotClosed` for the loop that misses most, where one misses by more than numbers do; loops with
-    the poses of their two frames."""
+    """Raise :class:`LoopsNotClosed` for the loop with the largest closure residual, if it exceeds rounding errors.
+    Loops come with the poses of their two frames."""
     misses = [residual(joint, X_P, X_S, length) for joint, X_P, X_S in loops]
     if not all(miss <= SAME_GEOMETRY for miss in misses):
         worst = int(np.argmax(misses))
@@ -126,11 +127,12 @@ def require_closed(robot: str, loops: Sequence[tuple[JointSpec, Array, Array]], 
             misses[worst],
             SAME_GEOMETRY,
             joint.name,
-            "; ".join(filter(None, [cure(misses[worst]), "hrsynth lint looks for where it closes"])),
+            "; ".join(filter(None, [cure(misses[worst]), "`hrsynth lint` searches for poses at which it closes"])),
         )
 
 
 def cure(opening: float) -> str:
-    """What may close loops that are open by so much (characteristic lengths, radians); nothing if far open."""
+    """Return the option that may close loops with this residual (characteristic lengths, radians); nothing for a large
+    one."""
     tolerance = 10.0 ** np.ceil(np.log10(max(opening, EXACT)))
     return f"if its numbers are rounded: --tolerance {tolerance:g}" if tolerance < LARGEST_NOISE else ""

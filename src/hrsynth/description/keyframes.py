@@ -1,6 +1,6 @@
-"""Postures that files name: keyframes of MJCF, the state of an SDF world, group states of an SRDF file beside a robot.
+"""Keyframes that files name: those of MJCF, the state of an SDF world, group states of an SRDF file next to a robot.
 
-A posture gives the values of tree joints, counted from the file's zero pose, as :mod:`.jointmotion` has them.
+A keyframe gives the values of tree joints, counted from the file's zero configuration, as in :mod:`.jointmotion`.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from .jointgraph import JointGraph, JointSpec, Posture, comma_list
 
 SRDF = ".srdf"
 STAY = "zero"
-"""The posture that every file has, unless it names another so."""
+"""Keyframe that every file has, unless it names another one so."""
 
 
 def value_of(kind: JointType, numbers: Array | Sequence[float], *, scalar_first: bool = True) -> Array | None:
-    """The value of a joint of this type that a file's numbers mean, None where they are not as many as it has.
+    """Return the value of a joint of this type from a file's numbers, None if their number is wrong.
 
-    A turn may be one angle or its cosine and sine; a ball is a unit quaternion, a free joint a place and one (w x y z,
-    or x y z w where its scalar is not first).
+    A rotation is one angle, or its cosine and sine; a spherical joint is a unit quaternion, a free joint a position and
+    one (w x y z, or x y z w if its scalar is not first).
     """
     given = np.array(numbers, dtype=float)
     if kind in (JointType.SPHERICAL, JointType.FREE):
@@ -43,8 +43,8 @@ def value_of(kind: JointType, numbers: Array | Sequence[float], *, scalar_first:
 
 
 def posture(graph: JointGraph, wanted: str) -> Posture:
-    """The posture of that name in the file itself or in the SRDF file beside it; of ``FILE.srdf:NAME`` in that file.
-    Raises ``BadRequest`` with the names there are."""
+    """Return the keyframe of that name in the file or in the SRDF file next to it; of ``FILE.srdf:NAME`` in that file.
+    Raises ``BadRequest`` with the known names."""
     if wanted in graph.postures or wanted == STAY:
         return graph.postures.get(wanted, {})
     stated, _, name = wanted.rpartition(":")
@@ -62,13 +62,13 @@ def posture(graph: JointGraph, wanted: str) -> Posture:
 
 
 def _beside(path: Path) -> list[Path]:
-    """The SRDF files that belong to a robot file by their place and name."""
+    """Return the SRDF files that belong to a robot file by folder and name."""
     places = path.with_suffix(SRDF), path.parent.parent / "srdf" / (path.stem + SRDF)
     return [place for place in places if place.is_file()][:1]
 
 
 def _group_states(path: Path) -> dict[str, xml.Element]:
-    """The group states of an SRDF file by name; ``GROUP/NAME`` where groups share a name."""
+    """Return the group states of an SRDF file by name; ``GROUP/NAME`` if groups share a name."""
     found: dict[str, xml.Element] = {}
     for state in xml.document(xml.content(path), str(path)).findall("group_state"):
         name = state.get("name", "")
@@ -77,7 +77,7 @@ def _group_states(path: Path) -> dict[str, xml.Element]:
 
 
 def _of_state(graph: JointGraph, name: str, state: xml.Element) -> Posture:
-    """The values that a group state gives to joints of the file; others are told."""
+    """Return the values that a group state gives to joints of the file; others are noted."""
     found, ignored = dict[str, Array](), list[str]()
     for element in state.findall("joint"):
         title, words = element.get("name", ""), element.get("value", "")
@@ -95,15 +95,15 @@ def _of_state(graph: JointGraph, name: str, state: xml.Element) -> Posture:
     if ignored:
         graph.note(
             "ignored",
-            f"the values that the keyframe {name!r} has for {comma_list(ignored)}: no such joints, "
-            "or not as many numbers as they have freedoms",
+            f"the values of {comma_list(ignored)} in the keyframe {name!r}: no such joints, "
+            "or not as many numbers as they have coordinates",
         )
     return found
 
 
 def from_keyframe(joints: Iterable[JointSpec], zeros: Mapping[str, float], qpos: Array) -> Posture | None:
-    """The posture of MuJoCo's coordinates, joint after joint: R and P count from ``zeros``, a ball has 4 numbers, a
-    free joint 7, its pose in the world. None where there are not as many."""
+    """Return the keyframe of MuJoCo's coordinates, joint after joint: R and P count from ``zeros``, a spherical joint
+    has 4 numbers, a free joint 7, its pose in the world. None if their number is wrong."""
     found, at = dict[str, Array](), 0
     for joint in joints:
         kind, name = joint.kind, joint.name

@@ -1,5 +1,5 @@
-"""Run by :func:`untrusted.output`: the triangles of the meshes on standard input, of each a line of JSON that counts
-points and triangles, and their bytes."""
+"""Process run by :func:`untrusted.output`: read the meshes named on standard input; for each write a line of JSON that
+counts points and triangles, then their bytes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hrsynth.untrusted import packing_defect, refuse
 
 
 class Beside:
-    """Finds the buffers that a mesh names in its own folder and below, of limited size; nothing else is opened."""
+    """Resolver of the buffers that a mesh names: files of limited size in its folder and below, nothing else."""
 
     def __init__(self, path: Path, largest: int) -> None:
         self.folder, self.largest = path.resolve().parent, largest
@@ -34,7 +34,7 @@ class Beside:
 
 
 def triangles(path: Path, text: str | None, largest: int) -> tuple[Any, Any] | None:
-    """The points (n, 3), all of them corners, and triangles (m, 3) of a mesh in a file, or given as text; None where it
+    """Return the points (n, 3), all of them corners, and triangles (m, 3) of a mesh from a file or text; None if it
     cannot be read."""
     import numpy as np
     import trimesh
@@ -61,7 +61,7 @@ def triangles(path: Path, text: str | None, largest: int) -> tuple[Any, Any] | N
 
 
 def main(largest: str) -> None:
-    """All meshes that are asked for, in order."""
+    """Write all requested meshes, in order."""
     out = sys.stdout.buffer
     for name, text in json.load(sys.stdin):
         found = triangles(Path(name), text, int(largest))

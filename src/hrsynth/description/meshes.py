@@ -1,4 +1,4 @@
-"""The files of meshes that a robot names: found, carried along to where it is written, read as triangles.
+"""Mesh files of a robot: located, copied to a new place, read as triangles.
 
 Their names are paths from the folder of the robot's own file, or addresses (``package://…``); a mesh that lies in a USD
 file is ``FILE#PRIM``.
@@ -27,22 +27,22 @@ from . import xml
 from .jointgraph import comma_list
 
 KNOWN = (".stl", ".obj", ".dae", ".ply", ".off", ".msh", ".glb", ".gltf", ".3mf", ".wrl", ".usd", ".usda", ".usdc")
-"""What meshes are called: no other file is read or copied."""
+"""Extensions of meshes: no other file is read or copied."""
 MANIFESTS = ("package.xml", "model.config")
-"""Files that a package of ROS or a model of Gazebo has."""
+"""Manifest files of a package of ROS or a model of Gazebo."""
 PROCESS = Path(__file__).with_name("mesh_process.py")
 
 
 def locate_mesh(name: str, folder: Path) -> Path | None:
-    """The file that a mesh's address names: beside the robot file, or of a package in a folder above it; None where
-    there is none on this machine, or it lies outside of the robot's folders, links followed."""
+    """Return the file of a mesh's address: next to the robot file, or of a package in a folder above it; None if it
+    does not exist, or lies outside of the robot's folders, links followed."""
     return next((path for path in _candidates(name, folder) if _belongs(path.resolve(), folder.resolve())), None)
 
 
 def _belongs(path: Path, folder: Path) -> bool:
-    """Whether a file lies in the folders of a robot: its package, which is the nearest folder with a manifest, and
-    packages beside that; without one the folder above that of the robot's file, or only that where the one above is a
-    user's home or holds everything."""
+    """Return True if a file lies in the folders of a robot: its package (the nearest folder with a manifest) and
+    packages next to it; without one the folder above that of the robot's file, or only that if the one above is the
+    user's or holds everything."""
     package = next((each for each in (folder, *folder.parents) if _is_package(each)), None)
     if package is None:
         home = Path.home().resolve()
@@ -58,7 +58,7 @@ def _is_package(folder: Path) -> bool:
 
 
 def _candidates(name: str, folder: Path) -> Iterator[Path]:
-    """The files that an address may mean."""
+    """Yield the files that an address may refer to."""
     scheme, _, rest = name.partition("://")
     try:
         paths = [folder / name] if not rest else [Path(rest)] if scheme == "file" else []
@@ -109,7 +109,7 @@ def triangles(
 
 
 def _within_folder(path: Path, within: Path) -> Path | None:
-    """A file where it lies in a folder, links resolved, or else one of its name there."""
+    """Return a file if it lies in a folder, links resolved, or else the one of its name there."""
     for each in (path, within / path.name):
         if each.is_file() and each.resolve().is_relative_to(within.resolve()):
             return each
@@ -117,7 +117,7 @@ def _within_folder(path: Path, within: Path) -> Path | None:
 
 
 def _inner(names: Iterable[str], folder: Path, within: Path | None = None) -> dict[str, str]:
-    """Those of the meshes that lie in USD files, as the text of ``.obj`` files."""
+    """Return the meshes that lie in USD files, as the text of ``.obj`` files."""
     asked: dict[Path, dict[str, str]] = {}
     for name in names:
         file, sign, prim = name.partition("#")
@@ -144,7 +144,7 @@ def carry_meshes(
     """A robot whose meshes are named from the folder of ``target``; what has to be written there for it (``copy``: all
     meshes, into ``meshes/``); and notes.
 
-    A dialect that can name only files with certain ``endings`` gets no others, nor names of files that are not there.
+    A format that can name only files with certain extensions (``endings``) gets no others, nor names of missing files.
     """
     if robot.file is None or not any("<mesh" in fragment for link in robot.links.values() for fragment in link.xml):
         return replace(robot, file=str(target)), {}, []
@@ -158,7 +158,7 @@ def carry_meshes(
     texts = cache(lambda: _inner(drawn, source))
 
     def place(name: str) -> str | None:
-        """What the mesh is called in the new file; None where it has to be left out."""
+        """Return the name of a mesh in the new file; None if it is left out."""
         path, (file, sign, prim) = locate_mesh(name, source), name.partition("#")
         inner = locate_mesh(file, source) if path is None and sign else None
         if path is None and inner is None:
@@ -175,9 +175,11 @@ def carry_meshes(
             if one in copied:
                 return copied[one]
             if len(files) >= MOST_MESHES:
-                raise BadRequest(f"{robot.name}: files of meshes", f"more than {MOST_MESHES}", f"up to {MOST_MESHES}")
+                raise BadRequest(
+                    f"{robot.name}: too many mesh files", f"more than {MOST_MESHES}", f"up to {MOST_MESHES}"
+                )
             if path is not None and path.stat().st_size > LARGEST_MESHES:
-                raise BadRequest("bytes of a mesh", path.stat().st_size, f"up to {LARGEST_MESHES}")
+                raise BadRequest("mesh too large, in bytes", path.stat().st_size, f"up to {LARGEST_MESHES}")
             stem = Path(prim).name if path is None else path.stem
             new = folder / "meshes" / f"{stem}{ending}"
             while new in files:
@@ -217,10 +219,10 @@ def carry_meshes(
     notes = []
     for names, what in (
         (missing, "missing meshes" + (" are not written" if endings else "")),
-        (outside, "meshes outside of the robot's folders are left alone"),
-        (foreign, f"meshes are not written, as only binary files {', '.join(endings or ())} can be"),
-        (strange, "files whose names are not those of meshes are not copied"),
-        (inside, "meshes lie in the USD file (--meshes copy makes files of them)"),
+        (outside, "meshes outside of the robot's folders keep their paths"),
+        (foreign, f"meshes that are not binary {', '.join(endings or ())} files are not written"),
+        (strange, "files without an extension of meshes are not copied"),
+        (inside, "meshes lie in the USD file (--meshes copy writes them as files)"),
     ):
         if names:
             notes.append(Note("warning", f"{what}: {comma_list(names, 4)}"))
@@ -228,7 +230,7 @@ def carry_meshes(
 
 
 def _is_text(path: Path | None) -> bool:
-    """Whether a file is an STL of the kind that is text."""
+    """Return True if a file is an STL in text form."""
     if path is None or path.suffix.lower() != ".stl":
         return False
     with path.open("rb") as file:
@@ -237,7 +239,7 @@ def _is_text(path: Path | None) -> bool:
 
 
 def write_meshes(files: dict[Path, Callable[[], bytes]]) -> list[Path]:
-    """Write them; those that are new. What is there with other content is not replaced; all or none are written."""
+    """Write meshes and return the new ones. A file with other content is not replaced; all or none are written."""
     from .files import require_same, write_whole
 
     new: list[Path] = []
@@ -247,7 +249,7 @@ def write_meshes(files: dict[Path, Callable[[], bytes]]) -> list[Path]:
             data = content()
             size += len(data)
             if size > LARGEST_MESHES:
-                raise BadRequest("bytes of all meshes together", size, f"up to {LARGEST_MESHES}")
+                raise BadRequest("meshes too large, in bytes together", size, f"up to {LARGEST_MESHES}")
             require_same(path, data)
             if not path.exists():
                 path.parent.mkdir(exist_ok=True)
@@ -257,12 +259,12 @@ def write_meshes(files: dict[Path, Callable[[], bytes]]) -> list[Path]:
         remove_written(new)
         if isinstance(error, HrsynthError):
             raise
-        raise BadRequest(f"a mesh is not copied: {error.strerror}", str(error.filename)) from None
+        raise BadRequest(f"cannot copy a mesh: {error.strerror}", str(error.filename)) from None
     return new
 
 
 def remove_written(new: list[Path]) -> None:
-    """Remove what :func:`write_meshes` wrote."""
+    """Remove the files that :func:`write_meshes` wrote."""
     for path in new:
         path.unlink(missing_ok=True)
     for folder in {path.parent for path in new}:

@@ -1,4 +1,4 @@
-"""Numbers in files: read strictly, written on a grid so that writing what was read gives the same digits.
+"""Numbers in files: parsed strictly, written on a grid, so that writing what was read gives the same digits.
 
 A written number is a multiple of 10^-n, with n so large that rounding stays below every tolerance and so small that
 the noise of floating-point products (a few units of 1e-16) never moves a number to the next multiple.
@@ -22,40 +22,40 @@ ANGLE_DECIMALS = 13
 """Decimals of angles and of the components of axes."""
 
 SIMPLE_ANGLE = math.pi / 12
-"""Angles that are typed are multiples of this one."""
+"""Step of which typed angles are multiples."""
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,4})?", re.ASCII)
 
 
 @dataclass
 class Digits:
-    """What the numbers of a file tell of their own accuracy."""
+    """Accuracy of a file's numbers, judged by their digits."""
 
     numbers: Counter[tuple[int, int]] = field(default_factory=Counter)
-    """How many numbers have so many decimals and significant digits."""
+    """Count of numbers with so many decimals and significant digits."""
     rounded: bool = False
-    """Whether a unit vector has not quite length one, or an angle is not quite a simple part of a turn."""
+    """A unit vector misses length one, or an angle a simple fraction of a full rotation, by little."""
 
     def read(self, text: str) -> None:
-        """Take numbers into account as they are written."""
+        """Count the digits of numbers as they are written."""
         for word in text.split():
             number, _, exponent = word.lower().partition("e")
             decimals = len(number.partition(".")[2]) - int(exponent or 0)
             self.numbers[decimals, len(number.replace(".", "").lstrip("+-0"))] += 1
 
     def length(self, size: float) -> None:
-        """The length of a vector that should have length one."""
+        """Record the length of a vector that should have length one."""
         self.rounded |= EXACT < abs(size - 1) < NEARLY_ONE
 
     def angles(self, values: Array) -> None:
-        """Angles (rad): simple parts of a turn are seldom meant to be missed by little."""
+        """Record angles (rad) that miss a simple fraction of a full rotation by little."""
         steps = np.round(values / SIMPLE_ANGLE)
         misses = np.abs(values - steps * SIMPLE_ANGLE)[steps != 0]
         self.rounded |= bool(np.any((misses > EXACT) & (misses < NEARLY_ONE)))
 
     @property
     def last_place(self) -> float:
-        """One in the last decimal, that one in five of the longer numbers reach; where more of them share their count
-        of significant digits, one in the coarsest last digit of these; 0 where none are rounded."""
+        """Size of the last decimal that one in five of the longer numbers reach; if more of them share their count of
+        significant digits, that of the coarsest last digit of these; 0 if none are rounded."""
         longer = sorted(each for each in self.numbers.elements() if each[0] >= FEWEST_DECIMALS)
         if len(longer) < FEWEST_ROUNDED:
             return 0.0
@@ -69,7 +69,7 @@ class Digits:
 
 
 def parse(text: str, count: int) -> Array:
-    """The ``count`` numbers of ``text``; shape (count,). Raises ``ValueError`` that says what was expected."""
+    """Return the ``count`` numbers of ``text``, shape (count,). Raises ``ValueError`` with the expected values."""
     words = text.split()
     for word in words:
         if not _NUMBER.fullmatch(word):
@@ -82,34 +82,35 @@ def parse(text: str, count: int) -> Array:
 
 
 def decimal(value: float, decimals: int) -> str:
-    """``value`` rounded to ``decimals``, at most 15 significant digits, in its shortest form; -0 is 0."""
+    """Return ``value`` rounded to ``decimals``, at most 15 significant digits, in its shortest form; -0 is 0."""
     rounded = round(float(value), decimals)
     return f"{rounded:.15g}" if rounded else "0"
 
 
 def exact(value: float) -> str:
-    """``value`` in the shortest form that reads back as the same float; whole numbers without a point."""
+    """Return ``value`` in the shortest form that reads back as the same float; integers without a point."""
     text = repr(float(value))
     return text.removesuffix(".0") if text != "-0.0" else "0"
 
 
 def exact_vector(values: ArrayLike) -> str:
-    """The numbers of a vector in that form."""
+    """Return the numbers of a vector in that form."""
     return " ".join(exact(value) for value in np.asarray(values, dtype=float))
 
 
 def length_decimals(scale: float) -> int:
-    """Decimals of a length in a robot whose largest coordinate is ``scale`` metres: 14 significant digits of it."""
+    """Return the decimals of a length in a robot whose largest coordinate is ``scale`` metres: 14 significant
+    digits."""
     return 13 - math.floor(math.log10(scale * (1 + 1e-7))) if scale > 0 else ANGLE_DECIMALS
 
 
 def vector(values: ArrayLike, decimals: int) -> str:
-    """The numbers of a vector, each rounded to ``decimals``."""
+    """Return the numbers of a vector, each rounded to ``decimals``."""
     return " ".join(decimal(value, decimals) for value in np.asarray(values, dtype=float))
 
 
 def axis(direction: ArrayLike) -> str:
-    """A unit vector of shape (3,): two components on the grid, the largest one such that the length is one."""
+    """Return a unit vector of shape (3,): two components on the grid, the largest one such that the length is one."""
     values = np.asarray(direction, dtype=float)
     values = values / np.linalg.norm(values)
     sizes = np.abs(values)
@@ -121,9 +122,9 @@ def axis(direction: ArrayLike) -> str:
 
 
 def rpy(rotation: Array) -> tuple[float, float, float]:
-    """Roll, pitch, yaw of a rotation (3, 3), rounded.
+    """Return roll, pitch, yaw of a rotation (3, 3), rounded.
 
-    Where the pitch is nearly ±90° the yaw is rounded as coarsely as it is undetermined, and the roll makes up for it.
+    If the pitch is nearly ±90°, the yaw is rounded as coarsely as it is undetermined, and the roll compensates.
     """
     cosine = math.hypot(rotation[0, 0], rotation[1, 0])
     yaw = 0.0
@@ -137,12 +138,12 @@ def rpy(rotation: Array) -> tuple[float, float, float]:
 
 
 def _half_open(angle: float) -> float:
-    """The angle, with -π taken as π."""
+    """Return the angle, with -π replaced by π."""
     return math.pi if abs(abs(angle) - math.pi) < 1e-12 else angle
 
 
 def origin(X: Array, decimals: int) -> tuple[Array, dict[str, str]]:
-    """A pose as the attributes of an ``<origin>``, and the pose (4, 4) that reading them gives."""
+    """Return a pose as the attributes of an ``<origin>``, and the pose (4, 4) that reading them gives."""
     attributes = {}
     xyz = vector(X[:3, 3], decimals)
     if xyz != "0 0 0":
@@ -154,7 +155,7 @@ def origin(X: Array, decimals: int) -> tuple[Array, dict[str, str]]:
 
 
 def from_origin(xyz: Array, angles: Array) -> Array:
-    """The pose (4, 4) that an ``<origin>`` means."""
+    """Return the pose (4, 4) of an ``<origin>``."""
     if not np.any(angles):
         return pose(xyz)
     return pose(xyz, rotation_from_rpy(*angles))

@@ -34,15 +34,15 @@ OFFERED = (
     ((-0.1, -0.5, 0.3), (0.0, 1.0, 0.0)),
     ((0.2, 0.3, -0.4), (0.6, 0.0, 0.8)),
 )
-"""Points of a link (characteristic lengths) and axes, no three points on one line and not four in one plane, that are
-offered where none are given."""
+"""Points of a link (characteristic lengths) and axes that are candidates by default; no three points on one line, not
+four in one plane."""
 WORLD = "world"
-"""What the base is called besides its own name."""
+"""Name of the base besides its own."""
 
 
 @dataclass(frozen=True)
 class ObservationSpec:
-    """An observation as it is written: ``link`` is the joint of an encoder; ``at`` (m) and ``axis`` are in the link's
+    """Observation as it is written: ``link`` is the joint of an encoder; ``at`` (m) and ``axis`` are in the link's
     frame; ``camera`` names one, None the mechanism's reference link."""
 
     kind: str
@@ -59,7 +59,7 @@ class ObservationSpec:
 
 
 def spec_of(attributes: Mapping[str, str], line: int | None = None) -> ObservationSpec:
-    """What the attributes of an ``<observe>`` say; raises ``BadRequest``."""
+    """Return the observation of an ``<observe>``. Raises ``BadRequest``."""
     kind = attributes.get("kind", "direction")
     needs = _needs(kind)
     own = "joint" if "joint" in needs else "link"
@@ -76,7 +76,7 @@ def spec_of(attributes: Mapping[str, str], line: int | None = None) -> Observati
     used = (own, *(name.removesuffix("?") for name in needs))
     for name in ("link", "joint", "at", "axis", "radius"):
         if name in attributes and name not in used:
-            raise BadRequest(f"observe {kind} with an attribute it does not use", name, list(dict.fromkeys(used)))
+            raise BadRequest(f"observe {kind} does not use this attribute", name, list(dict.fromkeys(used)))
     if "axis" in numbers and not any(numbers["axis"]):
         raise BadRequest(f"observe {kind}: axis", attributes["axis"], "a non-zero vector")
     radius = numbers["radius"][0] if "radius" in numbers else None
@@ -93,8 +93,8 @@ def spec_of(attributes: Mapping[str, str], line: int | None = None) -> Observati
 
 
 def attributes_of(seen: Observation, mechanism: Mechanism, decimals: int) -> dict[str, str]:
-    """The attributes of an ``<observe>`` that say an observation, points with so many decimals; raises ``BadRequest``
-    where it is of no kind that files have, or no camera that has a name is on the link from which it is seen."""
+    """Return the attributes of an ``<observe>``, points with so many decimals. Raises ``BadRequest`` if files do not
+    have this kind, or no named camera is on the observing link."""
     if not isinstance(seen, (*kinds().values(),)):
         raise BadRequest(f"observation {seen.leg!r}", type(seen).__name__, list(kinds()))
     link = str(seen.seen_from) if isinstance(seen, Inclination) else seen.link
@@ -112,7 +112,7 @@ def attributes_of(seen: Observation, mechanism: Mechanism, decimals: int) -> dic
 
 
 def _eye(mechanism: Mechanism, seen: Observation) -> str | None:
-    """The name of a camera on the link from which something is seen; None where that is the reference link."""
+    """Return the name of a camera on the link from which something is observed; None for the reference link."""
     if seen.seen_from in (None, mechanism.reference):
         return None
     for camera in mechanism.cameras:
@@ -122,7 +122,7 @@ def _eye(mechanism: Mechanism, seen: Observation) -> str | None:
 
 
 def parse_see(text: str, cameras: Sequence[str]) -> ObservationSpec:
-    """What a word of ``--sensor`` says; without a name, of the one camera in ``cameras`` where there is one."""
+    """Return the observation of a word of ``--sensor``; without a camera's name, by the only one of ``cameras``."""
     head, given, place = text.partition(":")
     camera, named, kind = head.rpartition("=")
     if not given or (named and not camera.strip()):
@@ -138,36 +138,41 @@ def parse_see(text: str, cameras: Sequence[str]) -> ObservationSpec:
         if where := re.search("@([^@/]*,[^@/]*)$", link):
             form = f"{head}:{'JOINT' if 'joint' in needs else 'LINK'}"
             raise BadRequest(
-                f"--sensor {text}: a place, of which the kind {kind} has none",
+                f"--sensor {text}: kind {kind} has no point",
                 where[1],
                 form + "/dx,dy,dz" * ("axis" in needs) + "[/dx,dy,dz]" * ("axis?" in needs),
             )
     attributes = {"kind": kind, "joint" if "joint" in needs else "link": link or at}
     if "at" in needs:
         if not link:
-            raise BadRequest(f"--sensor {text}: where on the link", at, SEE)
+            raise BadRequest(f"--sensor {text}: point on the link", at, SEE)
         attributes["at"] = _numbers(at, f"--sensor {text}")
     for name in ("axis", "radius"):
         if more and (name in needs or f"{name}?" in needs):
             attributes[name] = _numbers(more.pop(0), f"--sensor {text}")
     if more:
         raise BadRequest(
-            f"--sensor {text}: more than the kind needs", "/".join(more), ", ".join(needs) or "nothing more"
+            f"--sensor {text}: too many values for this kind", "/".join(more), ", ".join(needs) or "no more"
         )
     by_camera = issubclass(kinds()[kind], CameraObservation)
     if by_camera and not camera and len(set(cameras)) > 1:
-        raise BadRequest(f"--sensor {text}: by which camera", None, ", ".join(f"{name}={text}" for name in cameras))
+        raise BadRequest(f"--sensor {text}: no camera named", None, ", ".join(f"{name}={text}" for name in cameras))
     camera = camera or (cameras[0] if by_camera and cameras else "")
     try:
         found = spec_of(attributes | ({"camera": camera} if camera else {}))
     except BadRequest as error:
-        raise BadRequest(f"--sensor {text}: {error.problem}", error.got, error.expected or SEE) from None
+        raise BadRequest(
+            f"--sensor {text}: {error.problem}",
+            error.got,
+            error.expected or (None if error.remedy else SEE),
+            remedy=error.remedy,
+        ) from None
     return found
 
 
 def split_offers(text: str) -> list[str]:
-    """The words of an ``--candidate-sensor`` with commas between them, as point:platform,inclination: a kind alone is
-    of the link before it; commas between numbers part nothing."""
+    """Return the words of a ``--candidate-sensor`` separated by commas, as point:platform,inclination: a kind without a
+    link is of the link before it; commas between numbers do not separate."""
     found: list[str] = []
     for part in re.split(rf",(?=(?:[^,:=@/]+=)?(?:{'|'.join(kinds())})(?:[:,]|$))", text):
         link = re.sub("/[^/]*,[^/]*$", "", found[-1].partition(":")[2].partition("@")[0]) if found else ""
@@ -176,14 +181,14 @@ def split_offers(text: str) -> list[str]:
 
 
 def offers(text: str, length: float) -> list[str]:
-    """The words of ``--sensor`` that are offered by one of ``--candidate-sensor``: itself, or where it names a link and
-    no place on it, several places, for a characteristic ``length`` (m); raises ``BadRequest``."""
+    """Return the words of ``--sensor`` that ``--candidate-sensor`` stands for: itself, or several points if it names
+    only a link, for a characteristic ``length`` (m). Raises ``BadRequest``."""
     head, _, place = text.partition(":")
     kind = head.rpartition("=")[2]
     needs = kinds()[kind].needs if kind in kinds() else ()
     if "joint" in needs:
         raise BadRequest(
-            f"--candidate-sensor {text}: an encoder", place, "another kind: encoders on all joints are tried anyway"
+            f"--candidate-sensor {text}: encoders are always tried on all joints", remedy="Name another kind."
         )
     if "radius" in needs or ("at" if "at" in needs else "axis") not in needs or re.search("@|/[^/]*,[^/]*$", place):
         return [text]
@@ -195,15 +200,16 @@ def offers(text: str, length: float) -> list[str]:
 
 
 def _numbers(part: str, option: str) -> str:
-    """Numbers with commas between them, as attributes have them; raises ``BadRequest`` where one is empty."""
+    """Return numbers with spaces in place of commas, as attributes have them. Raises ``BadRequest`` for an empty
+    number."""
     if not all(each.strip() for each in part.split(",")):
-        raise BadRequest(f"{option}: an empty number", part, "numbers with commas between them")
+        raise BadRequest(f"{option}: an empty number", part, "numbers separated by commas")
     return part.replace(",", " ")
 
 
 def parse_camera(text: str) -> NamedCamera:
-    """The camera that ``NAME=LINK@x,y,z/r,p,y/FOCAL,WIDTH,HEIGHT`` says; angles in radians or with ``deg``, the rest of
-    its picture in pixels."""
+    """Return the camera of ``NAME=LINK@x,y,z/r,p,y/FOCAL,WIDTH,HEIGHT``; angles in radians or with ``deg``, the image
+    in pixels."""
     name, _, place = text.partition("=")
     link, *where = place.split("@")
     parts = where[0].split("/") if len(where) == 1 else []
@@ -220,14 +226,14 @@ def parse_camera(text: str) -> NamedCamera:
         except ValueError as error:
             raise BadRequest(f"--camera {text}", part, str(error)) from None
         if len(found) not in (1, 3) or not np.all(values > 0) or np.any(values[1:] % 1):
-            raise BadRequest(f"--camera {text}", part, "the focal length in pixels, or with width and height")
+            raise BadRequest(f"--camera {text}", part, "the focal length in pixels, alone or with width and height")
         image[: len(found)] = [float(values[0]), *map(int, values[1:])]
     for number, part in enumerate(parts[:2]):
         words = [re.fullmatch(r"(.*?)(deg)?", word) for word in part.split(",")]
         try:
             values = numerals.parse(" ".join(word[1] for word in words if word), 3)
         except ValueError as error:
-            raise BadRequest(f"--camera {text}", part, f"{error} with commas between them") from None
+            raise BadRequest(f"--camera {text}", part, f"{error} separated by commas") from None
         if any(word and word[2] for word in words) and number == 0:
             raise BadRequest(f"--camera {text}", part, "metres")
         numbers[number] = values * [math.radians(1) if word and word[2] else 1.0 for word in words]
@@ -238,7 +244,7 @@ def parse_camera(text: str) -> NamedCamera:
 def with_sights(
     mechanism: Mechanism, specs: Sequence[ObservationSpec], cameras: Iterable[NamedCamera] = ()
 ) -> Mechanism:
-    """The mechanism with these cameras and observations besides its own; raises ``BadRequest``."""
+    """Return the mechanism with these cameras and observations added. Raises ``BadRequest``."""
     for camera in cameras:
         mechanism = _with_camera(mechanism, camera)
     for spec in specs:
@@ -249,7 +255,8 @@ def with_sights(
 def as_written(
     mechanism: Mechanism, specs: Sequence[ObservationSpec], cameras: Sequence[NamedCamera], file: str
 ) -> Mechanism:
-    """The same for those of a file; raises ``BadRobotFile`` with all that is wrong with them."""
+    """Return the mechanism with the cameras and observations of a file. Raises ``BadRobotFile`` with all their
+    defects."""
     defects: list[Defect] = []
     every: list[NamedCamera | ObservationSpec] = [*cameras, *specs]
     for each in every:
@@ -257,7 +264,14 @@ def as_written(
             mechanism = _with_camera(mechanism, each) if isinstance(each, NamedCamera) else _with_sight(mechanism, each)
         except BadRequest as error:
             defects.append(
-                Defect(file, each.line, error.problem, None if error.got is None else str(error.got), error.expected)
+                Defect(
+                    file,
+                    each.line,
+                    error.problem,
+                    None if error.got is None else str(error.got),
+                    error.expected,
+                    error.remedy,
+                )
             )
     if defects:
         raise BadRobotFile(defects)
@@ -267,32 +281,32 @@ def as_written(
 def _with_camera(mechanism: Mechanism, camera: NamedCamera) -> Mechanism:
     link = _link(mechanism, camera.link, f"camera {camera.name!r}: unknown link")
     if any(camera.name == each.name for each in mechanism.cameras):
-        raise BadRequest("a second camera of this name", camera.name, "another name")
+        raise BadRequest("camera name already used", camera.name, "another name")
     return replace(mechanism, cameras=(*mechanism.cameras, replace(camera, link=link)))
 
 
 def _with_sight(mechanism: Mechanism, spec: ObservationSpec) -> Mechanism:
-    """With the observation, whose label is by default its kind and a number that is free."""
+    """Return the mechanism with the observation, labelled by default with its kind and a free number."""
     taken = {o.leg for o in mechanism.observations}
     label = spec.leg or next(f"{spec.kind}_{n}" for n in count(1) if f"{spec.kind}_{n}" not in taken)
     found = resolve_sight(mechanism, replace(spec, leg=label))
     if {each.key for each in found} & {each.key for each in mechanism.observations}:
-        raise BadRequest(f"observe {spec}: a second one with this label", label, "a label of its own")
+        raise BadRequest(f"observe {spec}: label already used", label, "another label")
     return replace(mechanism, observations=(*mechanism.observations, *found))
 
 
 def resolve_sight(mechanism: Mechanism, spec: ObservationSpec) -> tuple[Observation, ...]:
-    """The observations (of a joint with two coordinates, two) that a description says; raises ``BadRequest``."""
+    """Return the observations (for a joint with two coordinates, two) of a description. Raises ``BadRequest``."""
     label, kind = str(spec.leg), kinds()[spec.kind]
     if label == "all" or "," in label:
-        raise BadRequest(f"observe {spec}: a label that does not fit into a list", label, "one without commas, not all")
+        raise BadRequest(f"observe {spec}: label not usable in a list", label, "a label without commas, other than all")
     if kind is Encoder:
         if spec.link not in mechanism.joints:
             raise BadRequest("observe encoder: unknown joint", spec.link, sorted(mechanism.joints))
         read = encoders(mechanism, mechanism.joints[spec.link], label)
         if not read:
             raise BadRequest(
-                f"observe encoder: the joint {spec.link!r}",
+                f"observe encoder: type of joint {spec.link!r}",
                 mechanism.joints[spec.link].type.name.lower(),
                 "one with one axis or two",
             )
@@ -300,13 +314,13 @@ def resolve_sight(mechanism: Mechanism, spec: ObservationSpec) -> tuple[Observat
     link = _link(mechanism, spec.link, f"observe {spec.kind}: unknown link")
     if issubclass(kind, Inclination):
         if link == mechanism.base:
-            raise BadRequest("observe inclination: of the base itself", link, "a link that moves")
+            raise BadRequest("observe inclination: the base does not move", link, "a link that moves")
         vertical = frozen((0, 0, 1) if spec.axis is None else spec.axis)
         return (Inclination(label, mechanism.base, vertical, seen_from=link, line=spec.line),)
     camera = _camera(mechanism, spec)
     seen_from = mechanism.reference if camera is None else camera.link
     if seen_from == link:
-        raise BadRequest(f"observe {spec}: seen from the same link", link, "another link, or a camera on another")
+        raise BadRequest(f"observe {spec}: the camera is on the same link", link, "another link")
     if issubclass(kind, Direction):
         return (Direction(label, link, frozen(spec.axis or ()), line=spec.line, seen_from=seen_from),)
     assert issubclass(kind, CameraObservation)
@@ -329,7 +343,9 @@ def _camera(mechanism: Mechanism, spec: ObservationSpec) -> NamedCamera | None:
         if camera.name == spec.camera:
             return camera
     raise BadRequest(
-        f"observe {spec}: unknown camera", spec.camera, [camera.name for camera in mechanism.cameras] or "none is named"
+        f"observe {spec}: unknown camera",
+        spec.camera,
+        [camera.name for camera in mechanism.cameras] or "a camera declared with --camera or <camera>",
     )
 
 

@@ -1,4 +1,4 @@
-"""What a user says of a file that the file does not say, or says otherwise."""
+"""Overrides: user data that replaces or completes what a robot file gives."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ _CLOSURE = re.compile(rf"(?P<one>{_END}):(?P<two>{_END})(?::(?P<kind>\w+))?", re
 
 @dataclass(frozen=True)
 class Overrides:
-    """Base, platform, the motors' joints, closures ``A:B[:type]`` (A, B links, or points ``A@x,y,z`` in them), joints
-    to freeze, links to observe, the posture that is the zero pose, the unit of the file's lengths; None or empty where
-    the file (or a guess) decides. Up to which ``tolerance`` relations of joints are made exact, or that they stay
-    ``as_written``."""
+    """Overrides of a robot file: base, platform, joints of motors, closures ``A:B[:type]`` (A, B links, or points
+    ``A@x,y,z`` in them), joints to freeze, links to observe, the keyframe that is the zero configuration, the unit of
+    the file's lengths; None or empty if the file (or an assumption) decides. Relations of joints up to ``tolerance``
+    are made exact; with ``as_written`` none is."""
 
     base: str | None = None
     platform: str | None = None
@@ -58,12 +58,11 @@ class Overrides:
         as_written: bool = False,
         **more: str | None,
     ) -> Overrides:
-        """What a user says, lists also as texts with commas."""
+        """Return the overrides of these options; lists may be texts with commas."""
         if tolerance is not None and as_written:
             raise BadRequest(
-                "--as-written keeps the numbers, --tolerance says how far they are changed",
-                f"{tolerance:g}",
-                "one of the two",
+                f"--tolerance {tolerance:g}: cannot be combined with --as-written",
+                remedy="Omit one.",
             )
         number = isinstance(tolerance, Real)
         if tolerance is not None and not (number and EXACT < tolerance <= LARGEST_NOISE):
@@ -84,14 +83,14 @@ class Overrides:
 
     @property
     def any(self) -> bool:
-        """Whether anything is given that changes what the file says."""
+        """An option is given that changes the content of the file."""
         return bool(self.close or self.freeze) or any(
             each is not None for each in (self.platform, self.motors, self.unit, self.keyframe)
         )
 
     @property
     def named(self) -> tuple[set[str | None], set[str]]:
-        """The links and the joints that are named."""
+        """Links and joints that are named."""
         ends = [
             match[end].partition("@")[0]
             for each in self.close
@@ -102,7 +101,7 @@ class Overrides:
 
     @property
     def words(self) -> tuple[str, ...]:
-        """The options of the command line that say the same; ``--observe`` is left to what is watched."""
+        """Options of the command line for these overrides, except ``--observe``."""
         found: list[str] = []
         for each in fields(self):
             value, flag = getattr(self, each.name), f"--{each.name.replace('_', '-')}"
@@ -114,14 +113,14 @@ class Overrides:
         return tuple(found)
 
     def apply(self, graph: JointGraph) -> None:
-        """Unit, closures, frozen joints and motors, in the graph of a file."""
+        """Apply unit, closures, frozen joints and motors to the graph of a file."""
         if self.unit is not None:
             if self.unit not in UNITS:
                 raise BadRequest("--unit", self.unit, ", ".join(UNITS))
             graph.scale(UNITS[self.unit])
             graph.links = {name: scaled_shapes(link, UNITS[self.unit]) for name, link in graph.links.items()}
             if any("<inertial" in text for link in graph.links.values() for text in link.xml):
-                graph.note("open", f"inertias are taken as they are written, lengths of the file as {self.unit}")
+                graph.note("open", f"masses and inertias are not scaled with the unit {self.unit}")
         for closure in self.close:
             _close(graph, closure)
         for name in self.freeze:
@@ -133,7 +132,7 @@ class Overrides:
 
 
 def names(value: str | Iterable[str] | None) -> tuple[str, ...] | None:
-    """A list of names, also as one text set apart by commas."""
+    """Return a list of names, given as such or as one text with commas."""
     if value is None:
         return None
     parts = value.split(",") if isinstance(value, str) else [*value] if isinstance(value, Iterable) else [value]
@@ -143,7 +142,7 @@ def names(value: str | Iterable[str] | None) -> tuple[str, ...] | None:
 
 
 def closures(value: str | Iterable[str]) -> tuple[str, ...]:
-    """A list of closures, also as one text set apart by commas, of which points have some of their own."""
+    """Return a list of closures, given as such or as one text with commas; points have commas of their own."""
     if not isinstance(value, str):
         return names(value) or ()
     whole = re.fullmatch(rf"\s*{_CLOSURE.pattern}(?:\s*,\s*{_CLOSURE.pattern.replace('?P<', '?P<_')})*\s*", value)
@@ -151,7 +150,7 @@ def closures(value: str | Iterable[str]) -> tuple[str, ...]:
 
 
 def _freeze(graph: JointGraph, name: str) -> None:
-    """Hold a joint at zero, and with it those that gears join to it."""
+    """Fix a joint at zero, and with it the joints that couplings connect to it."""
     graph.joints[name] = replace(graph.joints[name], type=JointType.FIXED, axes=(), motor=None, limits=None)
     geared = [gear for gear in graph.gears if name in (gear.driver, gear.driven)]
     graph.gears = [gear for gear in graph.gears if gear not in geared]
@@ -159,19 +158,19 @@ def _freeze(graph: JointGraph, name: str) -> None:
         other = gear.driven if name == gear.driver else gear.driver
         if gear.offset:
             raise BadRequest(
-                f"--freeze: joint {name!r} at zero, and with it {other!r} away from zero by the gear {gear.name!r}",
+                f"--freeze {name}: the coupling {gear.name!r} moves joint {other!r} away from zero; its offset",
                 gear.offset,
-                "joints that gears without an offset join",
+                "an offset of 0",
             )
         if gear.ratio or other == gear.driven:
-            graph.note("merged", f"joint {other!r} is held by the gear {gear.name!r}: {name!r} is frozen")
+            graph.note("merged", f"joint {other!r} is fixed by the coupling {gear.name!r}: {name!r} is frozen")
             _freeze(graph, other)
 
 
 def _close(graph: JointGraph, wish: str) -> None:
-    """A closure ``A:B[:type]``: the frames of links A and B, or those frames shifted to points ``A@x,y,z``, meet in all
-    that the type does not leave free (its axis is the z axis of A's frame); a point where no type is given. What closes
-    the same two frames in the file gives way to it."""
+    """Add a closure ``A:B[:type]``: the frames of links A and B, or those frames shifted to points ``A@x,y,z``, meet in
+    all directions that the type does not leave free (its axis is the z axis of A's frame); without a type in a point.
+    It replaces closures of the file between the same two frames."""
     match = _CLOSURE.fullmatch(wish)
     kind = None if match is None else CLOSURES.get(match["kind"] or "spherical")
     if match is None or kind is None or kind is JointType.UNIVERSAL:
@@ -191,10 +190,10 @@ def _close(graph: JointGraph, wish: str) -> None:
                 FrameSpec(link, frozen(pose(numerals.parse(point.replace(",", " "), 3)))) if at else FrameSpec(link)
             )
         except ValueError as error:
-            raise BadRequest("--close: a point", end, str(error)) from None
+            raise BadRequest("--close: point", end, str(error)) from None
     one, two = ends
     if one.link == two.link:
-        raise BadRequest("--close: a link cannot meet itself", wish, "two links")
+        raise BadRequest("--close: both ends are on one link", wish, "two links")
     for name, joint in list(graph.joints.items()):
         if not joint.in_tree and _same_ends(joint.ends, (one, two)):
             del graph.joints[name]
@@ -202,7 +201,7 @@ def _close(graph: JointGraph, wish: str) -> None:
 
 
 def _same_ends(ends: tuple[FrameSpec, FrameSpec], others: tuple[FrameSpec, FrameSpec]) -> bool:
-    """Whether two closures join the same two places."""
+    """Return True if two closures join the same two points."""
     table = {end.link: end.X[:3, 3] for end in others}
     return {end.link for end in ends} == set(table) and all(
         np.array_equal(table[end.link], end.X[:3, 3]) for end in ends
@@ -210,13 +209,13 @@ def _same_ends(ends: tuple[FrameSpec, FrameSpec], others: tuple[FrameSpec, Frame
 
 
 def _drive(graph: JointGraph, wanted: Iterable[str]) -> None:
-    """Motors on the named joints alone; both joints of a pair N__1, N__2 may be named as N."""
+    """Put motors on the named joints alone; both joints of a pair N__1, N__2 may be named as N."""
     chosen = set()
     for name in wanted:
         own = [each for each in graph.joints if name and name in (each, each.rpartition("__")[0])]
         if not own or all(graph.joints[each].type is JointType.FIXED for each in own):
             moving = [each for each, joint in graph.joints.items() if joint.type is not JointType.FIXED]
-            raise BadRequest("--motors: no such joint that moves", name, comma_list(moving, like=name))
+            raise BadRequest("--motors: no such movable joint", name, comma_list(moving, like=name))
         chosen.update(own)
     for name, joint in graph.joints.items():
         motor = (joint.motor or Motor(f"motor_{name}")) if name in chosen else None
@@ -224,14 +223,14 @@ def _drive(graph: JointGraph, wanted: Iterable[str]) -> None:
 
 
 def observe_links(mechanism: Mechanism, links: Iterable[str]) -> Mechanism:
-    """The mechanism with the default segments of the named links as its observed directions."""
+    """Return the mechanism with the default segments of the named links as its observed directions."""
     normal = normal_form(mechanism)
     legs = decompose(normal.mechanism)
     found = []
     for link in links:
         if normal.into.get(link) not in normal.mechanism.links:
             raise BadRequest(
-                f"{mechanism.name}: no link of a leg to observe", link, comma_list(normal.mechanism.links, like=link)
+                f"{mechanism.name}: not a link of a leg", link, comma_list(normal.mechanism.links, like=link)
             )
         default = observation_of(legs, normal.into[link])
         turn = mechanism.links[link].pose[:3, :3].T @ normal.mechanism.links[default.link].pose[:3, :3]

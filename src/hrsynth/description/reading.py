@@ -1,4 +1,4 @@
-"""From a path to a mechanism: the file is opened, shown to the dialects, and put together with what the user says."""
+"""Reading of a robot file: the file is opened, its format recognised, its mechanism assembled with the overrides."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from .overrides import Overrides, observe_links
 from .tree import spanning
 
 AS_IT_IS = Overrides()
-"""Nothing is given."""
+"""Overrides without any option."""
 
 
 def read(path: Path, overrides: Overrides) -> Mechanism:
-    """The mechanism of a file in any dialect, or of a folder with a URDF and a YAML file.
+    """Return the mechanism of a file in any format, or of a folder with a URDF and a YAML file.
 
-    Raises ``BadRobotFile`` for what is no robot, ``BadRequest`` for what has to be given, ``LoopsNotClosed`` and
-    ``RankUndecided`` where its loops stay open or undecided.
+    Raises ``BadRobotFile`` for a file that is not a robot, ``BadRequest`` for missing options, ``LoopsNotClosed`` and
+    ``RankUndecided`` for loops that stay open or undecided.
     """
     robot = understood(robot_file(path, overrides), overrides)
     data = b"" if robot.file is None else xml.content(Path(robot.file))
@@ -36,7 +36,7 @@ def read(path: Path, overrides: Overrides) -> Mechanism:
 
 
 def understood(file: RobotFile, overrides: Overrides) -> Mechanism:
-    """The mechanism of a file that was opened; raises as :func:`read`."""
+    """Return the mechanism of an opened file; raises like :func:`read`."""
     try:
         robot = formats.read(file)
     except LoopsNotClosed as error:
@@ -46,7 +46,10 @@ def understood(file: RobotFile, overrides: Overrides) -> Mechanism:
     if isinstance(robot, JointGraph):
         if len(robot.links) > MOST_LINKS or len(robot.joints) > 2 * MOST_LINKS:
             raise xml.refusal(
-                file.path, f"{len(robot.links)} links and {len(robot.joints)} joints", f"up to {MOST_LINKS} links"
+                file.path,
+                "too many links or joints",
+                f"up to {MOST_LINKS} links",
+                value=f"{len(robot.links)} links and {len(robot.joints)} joints",
             )
         from .assembly.build import build
         from .assembly.generic import with_generic_zero
@@ -57,19 +60,19 @@ def understood(file: RobotFile, overrides: Overrides) -> Mechanism:
 
 
 def _part(robot: Mechanism, overrides: Overrides) -> Mechanism:
-    """What of a robot is asked about: all of it, or what lies between base and platform; and what is watched."""
+    """Return the whole robot or the part between base and platform, with the observations of the overrides."""
     if overrides.base is not None or overrides.observe is not None:
         robot.require_platform()
     if overrides.base is not None:
         robot = spanning(between(robot, overrides.base, overrides.platform or robot.platform))
     if overrides.unit is None and robot.length > LARGEST_ROBOT:
-        text = f"the robot's characteristic length is {robot.length:.3g} m: if its file has millimetres, --unit mm"
+        text = f"the robot's characteristic length is {robot.length:.3g} m: if its file is in millimetres, --unit mm"
         robot = replace(robot, notes=(*robot.notes, Note("open", text)))
     return robot if overrides.observe is None else observe_links(robot, overrides.observe)
 
 
 def robot_file(path: Path, given: Overrides = AS_IT_IS, *, strict: bool | None = None) -> RobotFile:
-    """A file, opened (a folder's robot.urdf, or its only robot file), and what is ``given`` for it."""
+    """Return an opened file (a folder's robot.urdf, or its only robot file) with the ``given`` overrides."""
     strict = not given.any if strict is None else strict
     if os.path.isdir(path):
         path = _in_folder(path)
@@ -93,7 +96,7 @@ def robot_file(path: Path, given: Overrides = AS_IT_IS, *, strict: bool | None =
 
 
 def _require_few(path: Path, root: xml.Element) -> None:
-    """Refuse what has too many links, joints, keyframes or observations before any of them is read."""
+    """Refuse a file with too many links, joints, keyframes or observations before any of them is read."""
     links, joints = ("link", "body", "model", "default", "frame"), ("joint", "connect", "weld")
     for names, most, what in (
         (links, 2 * MOST_LINKS, "links, bodies and frames"),
@@ -102,7 +105,7 @@ def _require_few(path: Path, root: xml.Element) -> None:
     ):
         if sum(1 for _ in islice(root.iter(*names), most + 1)) > most:
             allowed = f"{MOST_LINKS} links" if names is links else most
-            raise xml.refusal(path, f"more than {most} {what}", f"up to {allowed}")
+            raise xml.refusal(path, f"too many {what}", f"up to {allowed}", value=f"more than {most}")
 
 
 def _in_folder(path: Path) -> Path:

@@ -1,7 +1,7 @@
-"""A mechanism in the joints that a dialect has: other tree joints become chains, other loops are cut through the joint.
+"""Reduction to the joints of a format: other tree joints become chains, other loops are cut at the joint.
 
-A loop N that a dialect cannot say becomes the tree joint N, which carries a link N__cut of no size, and a rigid closure
-N__weld between that link and the successor.
+A loop N that a format cannot express becomes the tree joint N, which carries a link N__cut of no size, and a rigid
+closure N__weld between that link and the successor.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ def reduce(
     driven: Collection[JointType] = (),
     body: str = "",
 ) -> tuple[Mechanism, tuple[Note, ...]]:
-    """The mechanism with tree joints of types ``tree`` and loops of types ``loops`` (with a motor: ``driven``) only;
-    and what is lost. ``body`` follows the names of links in between.
+    """Return the mechanism with tree joints of types ``tree`` and loops of types ``loops`` (with a motor: ``driven``)
+    only, and the losses. ``body`` is a suffix of the names of links in between.
 
-    Raises ``BadRequest`` where a link in between would take the name of another.
+    Raises ``BadRequest`` if a link in between would get a name that is taken.
     """
     given = spanning(mechanism if JointType.FREE in tree else mechanism.changed(remove_joints=mechanism.idle))
     links, joints = dict(given.links), {}
@@ -70,6 +70,6 @@ def reduce(
 
 
 def require_free_world(robot: Mechanism, world: str, dialect: str) -> None:
-    """Raise ``BadRequest`` where a link has the name that a dialect keeps for the base."""
+    """Raise ``BadRequest`` if a link has the name that a format reserves for the base."""
     if world in robot.links and robot.base != world:
         raise BadRequest(f"{robot.name}: {dialect} reserves this name for the base", world, "another link name")

@@ -1,4 +1,4 @@
-"""Every mechanism is a spanning tree and loops: the choice of that tree."""
+"""Spanning tree of a mechanism: which joints are tree joints, which close loops."""
 
 from __future__ import annotations
 
@@ -22,13 +22,14 @@ _COST = {
     JointType.PLANAR: 10,
     JointType.SPHERICAL: 12,
 }
-"""Reluctance to have a joint of this type in the tree; a free joint closes no loop, so it is never one."""
+"""Cost of a joint of this type in the tree; a free joint closes no loop, so it is never one."""
 _OUTSIDE = 20
 """Added to the cost of a joint that was no tree joint before."""
 
 
 def spanning(mechanism: Mechanism) -> Mechanism:
-    """The same mechanism, its ``in_tree`` joints a spanning tree rooted at the base, each directed away from the base.
+    """Return the mechanism with a spanning tree of ``in_tree`` joints rooted at the base, each directed away from the
+    base.
 
     Unchanged where that holds already. Otherwise the tree is a minimum spanning tree that prefers the tree joints of
     before, then fixed joints, R and P, U, C, E, S, and actuated joints among equals; links and joints are ordered
@@ -38,17 +39,17 @@ def spanning(mechanism: Mechanism) -> Mechanism:
     Raises
     ------
     BadMechanism
-        Where a link hangs on nothing, or a joint between two links of the tree has all six freedoms.
+        For a link without a joint, or a joint between two links of the tree with six dof.
     """
     mechanism = _in_base_frame(mechanism)
     return chains.merge(mechanism if is_spanning(mechanism) else _cut(mechanism))
 
 
 def _cut(mechanism: Mechanism) -> Mechanism:
-    """The mechanism with a new spanning tree."""
+    """Return the mechanism with a new spanning tree."""
     lost = set(mechanism.links) - graphs.component(mechanism.adjacency, mechanism.base)
     if lost:
-        raise BadMechanism("a link that no chain of joints connects to the base", min(lost))
+        raise BadMechanism("link not connected to the base by joints", min(lost))
     joints = list(mechanism.joints.values())
     chosen = {joint.name for joint in graphs.spanning_forest(mechanism.links, joints, [_cost(j) for j in joints])}
 
@@ -81,7 +82,8 @@ def _cut(mechanism: Mechanism) -> Mechanism:
 
 
 def is_spanning(mechanism: Mechanism) -> bool:
-    """Whether the ``in_tree`` joints are a spanning tree rooted at the base, each directed away from the base."""
+    """Return True if the ``in_tree`` joints are a spanning tree rooted at the base, each directed away from the
+    base."""
     carriers = {joint.successor: joint for joint in mechanism.joints.values() if joint.in_tree}
     count = sum(joint.in_tree for joint in mechanism.joints.values())
     if not count == len(carriers) == len(mechanism.links) - 1 or mechanism.base in carriers:
@@ -92,12 +94,12 @@ def is_spanning(mechanism: Mechanism) -> bool:
 
 
 def is_connected(mechanism: Mechanism) -> bool:
-    """Whether chains of joints join every link to the base."""
+    """Return True if chains of joints connect every link to the base."""
     return len(graphs.component(mechanism.adjacency, mechanism.base)) == len(mechanism.links)
 
 
 def outward(mechanism: Mechanism) -> list[Joint]:
-    """The tree joints that hang on the base, every joint after the one that carries its predecessor."""
+    """Return the tree joints of the base's tree, every joint after the one that carries its predecessor."""
     tree = [joint for joint in mechanism.joints.values() if joint.in_tree]
     return [joint for joint, _, _ in graphs.outward(mechanism.base, tree)]
 

@@ -1,4 +1,4 @@
-"""Names of elements and attributes that a format has: a mistyped one is a defect, another unknown one a note.
+"""Names of elements and attributes of a format: a mistyped one is a defect, another unknown one a note.
 
 A name is mistyped if its element cannot have it and one edit (a character inserted, deleted, replaced or exchanged with
 the next; letter case, ``-`` and ``_`` do not count) makes it a name that the element can have and lacks, or can have
@@ -20,13 +20,13 @@ from . import xml
 from .file_format import RobotFile
 
 ANY = "..."
-"""In a table: an element may hold names that the format does not have, of which nothing is said."""
+"""Entry of a table: an element may hold names of other programs, which are not reported."""
 
 
 @dataclass(frozen=True)
 class ElementNames:
-    """Names that an element can have: attributes, child elements, those of them that may be repeated; ``open``: whether
-    it may hold names of other programs."""
+    """Names that an element can have: attributes, child elements, those of them that may be repeated; ``open``: it may
+    hold names of other programs."""
 
     attributes: frozenset[str]
     children: frozenset[str]
@@ -36,8 +36,8 @@ class ElementNames:
 
 @dataclass(frozen=True, eq=False)
 class UnknownName:
-    """A name that a format does not have in its place, the ``known`` ones there, and those ``meant``: it is a
-    misspelling of these."""
+    """Name that a format does not have in its place, the ``known`` ones there, and the ``meant`` ones of which it is a
+    misspelling."""
 
     element: xml.Element
     name: str
@@ -47,12 +47,12 @@ class UnknownName:
 
     @property
     def line(self) -> int | None:
-        """The line of the element that has the attribute, or of the element itself."""
+        """Line of the element that has the attribute, or of the element itself."""
         return xml.line(self.element)
 
     @property
     def place(self) -> str:
-        """Which kind of name it is, and of which element."""
+        """Kind of name and its element."""
         if self.is_attribute:
             return f"attribute of <{self.element.tag}>"
         parent = self.element.getparent()
@@ -60,12 +60,12 @@ class UnknownName:
 
     @property
     def found(self) -> str:
-        """The name as it is written."""
+        """Name as it is written."""
         return self._written(self.name)
 
     @property
     def remedy(self) -> str:
-        """The names that are meant, or one that is alike, as they are written."""
+        """Names of which it is a misspelling, or the most similar one, as they are written."""
         alike = difflib.get_close_matches(self.name.casefold(), self.known, n=1, cutoff=LIKE_A_WORD)
         return " or ".join(map(self._written, self.meant or alike))
 
@@ -75,14 +75,14 @@ class UnknownName:
 
 @dataclass(frozen=True, eq=False)
 class Vocabulary:
-    """The names of a format. ``text`` has a line ``element: attributes | children`` for each element that is read
-    (``parent/element`` where its names depend on the parent; a child with ``*`` may be repeated, ``...`` stands for
-    names of other programs; indented lines continue one). ``others`` are names of which nothing is said."""
+    """Names of a format. ``text`` has a line ``element: attributes | children`` for each element that is read
+    (``parent/element`` if its names depend on the parent; a child with ``*`` may be repeated, ``...`` stands for names
+    of other programs; indented lines continue one). ``others`` are names that are not reported."""
 
     text: str
     others: str = ""
     inside: Mapping[str, Vocabulary] = field(default_factory=dict)
-    """The formats of some ``parent/element``, with all that is in them."""
+    """Formats of some ``parent/element``, with all that is in them."""
 
     @cached_property
     def _others(self) -> frozenset[str]:
@@ -90,7 +90,7 @@ class Vocabulary:
 
     @cached_property
     def elements(self) -> dict[str, ElementNames]:
-        """The table."""
+        """Table of elements and their names."""
         found = dict[str, ElementNames]()
         for row in filter(str.strip, self.text.replace("\n    ", " ").splitlines()):
             keys, _, names = row.partition(":")
@@ -102,12 +102,12 @@ class Vocabulary:
         return found
 
     def is_other(self, name: str) -> bool:
-        """Whether nothing is said of a name: one of the ``others``, or with a prefix or a namespace."""
+        """Return True for a name that is not reported: one of the ``others``, or with a prefix or a namespace."""
         return "}" in name or ":" in name or name in self._others
 
     def unknown(self, root: xml.Element) -> Iterator[UnknownName]:
-        """The names in a document that the format does not have where they stand, in the order of the document, until
-        there are too many different ones to compare."""
+        """Yield the names in a document that the format does not have where they are, in order, until there are too
+        many different ones to compare."""
         key, met = str(root.tag), set[tuple[str, str]]()
         for each in self._of(root, self.elements[key]) if key in self.elements else ():
             met.add((each.name, each.place))
@@ -138,8 +138,8 @@ class Vocabulary:
                     yield UnknownName(child, tag, False, known.children, meant)
 
     def check(self, root: xml.Element, file: RobotFile) -> tuple[list[Defect], list[Note]]:
-        """The defects of a document's mistyped names, and a note of each other unknown name; mistyped names are no
-        defects of a file that is read in spite of them."""
+        """Return the defects of a document's mistyped names, and a note of each other unknown name; if the file is read
+        as spelt, mistyped names are no defects."""
         defects, notes = list[Defect](), dict[tuple[str, str], list[UnknownName]]()
         for each in self.unknown(root):
             if not each.meant:
@@ -149,21 +149,21 @@ class Vocabulary:
                 defects.append(Defect(where, each.line, f"unknown {each.place}", each.found, each.remedy))
         if len({(each.problem, each.got) for each in defects}) + len(notes) >= MOST_UNKNOWN_NAMES:
             raise xml.refusal(
-                file.path, "too many different names that the format does not have", f"fewer than {MOST_UNKNOWN_NAMES}"
+                file.path, "too many names that the format does not have", f"fewer than {MOST_UNKNOWN_NAMES}"
             )
         return defects, [_note_of(found) for found in notes.values()]
 
 
 def _note_of(found: list[UnknownName]) -> Note:
-    """The note of one name, wherever it stands."""
+    """Return the note of one name, for all its occurrences."""
     first = found[0]
     alike = first.remedy and f" (perhaps {first.remedy})"
     where = "" if first.line is None else f" (line {first.line}{', and more' * (len(found) > 1)})"
-    return Note("ignored", f"unknown {first.place}, found {first.found}{alike}{where}")
+    return Note("ignored", f"unknown {first.place}: got {first.found}{alike}{where}")
 
 
 def misspelt(name: str, known: Iterable[str]) -> tuple[str, ...]:
-    """The ``known`` names that one edit makes of a name, in order; those that differ in case, ``-`` or ``_`` alone."""
+    """Return the ``known`` names that one edit makes of a name, in order; letter case, ``-`` and ``_`` are ignored."""
     plain = _plain(name)
     return tuple(sorted(each for each in known if plain == (other := _plain(each)) or _is_one_edit(plain, other)))
 
@@ -173,7 +173,7 @@ def _plain(name: str) -> str:
 
 
 def _is_one_edit(one: str, two: str) -> bool:
-    """Whether a character inserted, deleted, replaced or exchanged with the next makes one text the other."""
+    """Return True if a character inserted, deleted, replaced or exchanged with the next makes one text the other."""
     if abs(len(one) - len(two)) > 1:
         return False
     k = next((k for k, (a, b) in enumerate(zip(one, two, strict=False)) if a != b), min(len(one), len(two)))

@@ -24,7 +24,7 @@ _CLOSED_BY = {b"<!--": b"-->", b"<?": b"?>"}
 _PREFIX = re.compile(r"Namespace prefix (?P<prefix>[A-Za-z_][\w.-]*) (?:on|for) ", re.ASCII)
 _ROOT = re.compile(rb"(?:\xef\xbb\xbf)?(?:\s+|<\?.*?\?>|<!--.*?-->)*<[^\s/>]+", re.DOTALL)
 _BREAK = re.compile(rb"&#0*(?:9|10|13);|&#x0*[9aAdD];")
-"""Tabs and ends of lines as references: in names they would be kept, where plain ones are read as spaces."""
+"""Tabs and line breaks as references: they are read as spaces, like plain ones."""
 _DECLARATION = re.compile(rb"<!\s*(DOCTYPE|ENTITY)")
 
 _ATTRIBUTE = re.compile(r"@(?P<name>(\{[^}]*\})?[^=]*)=(?P<value>.*)", re.DOTALL)
@@ -39,12 +39,12 @@ def _parser() -> etree.XMLParser:
 def refusal(
     file: str | Path, what: str, allowed: str | None = None, *, value: str | None = None, line: int | None = None
 ) -> BadRobotFile:
-    """The error of a file with one defect, or of a file as a whole."""
+    """Return the error of a file with one defect, or of a file as a whole."""
     return BadRobotFile([Defect(str(file), line, what, value, allowed)])
 
 
 def content(path: str | Path) -> bytes:
-    """The bytes of a robot file; raises :class:`BadRobotFile` for what is no readable file of a sensible size."""
+    """Return the bytes of a robot file. Raises :class:`BadRobotFile` for a file that cannot be read or is too large."""
     most = f"up to {LARGEST_FILE}"
     try:
         with open_regular(path) as stream:
@@ -54,10 +54,10 @@ def content(path: str | Path) -> bytes:
     except NotRegular as error:
         raise refusal(path, str(error.strerror), "a robot file") from None
     except FileNotFoundError:
-        raise refusal(path, "no such file", "the path of a file that is there") from None
+        raise refusal(path, "no such file", "the path of an existing file") from None
     except (OSError, ValueError) as error:
         raise refusal(
-            path, "cannot be read", "a file that can be read", value=getattr(error, "strerror", None) or str(error)
+            path, "cannot be read", "a readable file", value=getattr(error, "strerror", None) or str(error)
         ) from None
     if len(data) > LARGEST_FILE:
         raise refusal(path, "file too large", most, value=f"more than {LARGEST_FILE} bytes")
@@ -65,14 +65,13 @@ def content(path: str | Path) -> bytes:
 
 
 def document(text: bytes | str, file: str, notes: list[Note] | None = None) -> Element:
-    """The root element of an XML document; raises :class:`BadRobotFile` with the line where it stops being one.
+    """Return the root element of an XML document. Raises :class:`BadRobotFile` with the line of the first error.
 
-    Where ``notes`` are taken, comments that hold ``--`` are left out, and prefixes that nothing declares are read as
-    if it did; both are noted.
+    With ``notes``, comments with ``--`` are left out and undeclared prefixes are read as declared; both are noted.
     """
     data = text.encode() if isinstance(text, str) else text
     if not data.strip():
-        raise refusal(file, "an empty file", "a robot file", line=1)
+        raise refusal(file, "empty file", "a robot file", line=1)
     try:
         data.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -90,7 +89,7 @@ def document(text: bytes | str, file: str, notes: list[Note] | None = None) -> E
     if declaration := _DECLARATION.search(bare):
         raise refusal(
             file,
-            "a document type declaration, which is not allowed",
+            "a document type declaration is not allowed",
             line=bare.count(b"\n", 0, declaration.start()) + 1,
         )
     for _ in range(MOST_PREFIXES):
@@ -99,7 +98,7 @@ def document(text: bytes | str, file: str, notes: list[Note] | None = None) -> E
             _require_few_names(root, file)
             if root.getroottree().docinfo.internalDTD is None:
                 return root
-            what, at = "a document type declaration, which is not allowed", 1
+            what, at = "a document type declaration is not allowed", 1
         except etree.XMLSyntaxError as error:
             what, at = (error.msg or "syntax error").split(", line ")[0], error.lineno or 1
         except (ValueError, LookupError) as error:
@@ -110,11 +109,11 @@ def document(text: bytes | str, file: str, notes: list[Note] | None = None) -> E
         data = mended
     # raised here, not above: libraries that send errors between processes take their context along, and the parser's
     # own error cannot be sent
-    raise refusal(file, "malformed XML", "a whole document of XML", value=what, line=at)
+    raise refusal(file, "malformed XML", "a complete XML document", value=what, line=at)
 
 
 def _require_few_names(root: Element, file: str) -> None:
-    """Raise ``BadRobotFile`` where there are more names than any format has: what compares names takes its time."""
+    """Raise ``BadRobotFile`` for more names than any format has: comparing names takes time."""
     names = set()
     for element in root.iter("*"):
         names.add(element.tag)
@@ -131,7 +130,7 @@ def _require_few_names(root: Element, file: str) -> None:
 
 
 def _mend(data: bytes, what: str, notes: list[Note]) -> bytes:
-    """A document without what stopped the parser, where that means nothing: its lines stay where they are."""
+    """Return a document without what stopped the parser, if that has no meaning; the lines stay."""
     prefix, root = _PREFIX.search(what), _ROOT.match(data)
     if prefix is not None and root is not None:
         notes.append(
@@ -159,7 +158,7 @@ def _mend(data: bytes, what: str, notes: list[Note]) -> bytes:
 
 
 def _comments(data: bytes) -> Iterator[tuple[int, int]]:
-    """Where comments and processing instructions begin and end; each byte is looked at a bounded number of times."""
+    """Yield start and end of comments and processing instructions; each byte is read a bounded number of times."""
     starts, done = dict.fromkeys(_CLOSED_BY, 0), 0
     while starts:
         for opening in list(starts):
@@ -178,7 +177,7 @@ def _comments(data: bytes) -> Iterator[tuple[int, int]]:
 
 
 def _without_comments(data: bytes, left_out: Callable[[bytes], bool]) -> bytes:
-    """A document without those of its comments, whose lines stay."""
+    """Return a document without some of its comments; the lines stay."""
     parts, at = [], 0
     for start, end in _comments(data):
         comment = data[start:end]
@@ -189,25 +188,25 @@ def _without_comments(data: bytes, left_out: Callable[[bytes], bool]) -> bytes:
 
 
 def _is_wrong(comment: bytes) -> bool:
-    """Whether two hyphens follow each other in a comment, the last of them perhaps the first of its end."""
+    """Return True if two hyphens follow each other in a comment, the last of them perhaps the first of its end."""
     return comment.startswith(b"<!--") and b"--" in comment[4:-2]
 
 
 PLACES = "{urn:hrsynth}places"
-"""The attribute of a root element that has files and lines of a document that a program made: the elements' own lines
-count them."""
+"""Attribute of a root element with the files and lines of a generated document; the elements' own lines are indices of
+it."""
 MOST_PLACES = 65535
-"""Lines that an element can have."""
+"""Number of lines that an element can have."""
 
 
 def beside(main: Path, file: str) -> str:
-    """The name of a file as that of the ``main`` one is given, where it lies in its folder or below."""
+    """Return the name of a file relative to the ``main`` one if it lies in its folder or below."""
     folder, own = main.resolve().parent, Path(file).resolve()
     return str(main.parent / own.relative_to(folder)) if own.is_relative_to(folder) else file
 
 
 def give_places(root: Element, main: Path, places: Sequence[tuple[str, int] | None]) -> None:
-    """Give the elements of a document, in its order, their places: file (None for ``main``) and line."""
+    """Give the elements of a document, in its order, their sources: file (None for ``main``) and line."""
     table: dict[tuple[str | None, int] | None, int] = {}
     names = {str(main.resolve()): None}
     for element, place in zip(root.iter("*"), places, strict=True):
@@ -227,13 +226,13 @@ def _places(text: str) -> list[list[Any] | None]:
 
 
 class SourceLine(int):
-    """A line of a file that a document includes."""
+    """Line of an included file."""
 
     file: str
 
 
 def line(element: Element) -> int | None:
-    """The line of its file that an element starts in; a :class:`SourceLine` where the document includes that file."""
+    """Return the line of its file in which an element starts; a :class:`SourceLine` for an included file."""
     number: object = element.sourceline
     table = element.getroottree().getroot().get(PLACES)
     if table is not None:
@@ -251,12 +250,12 @@ def line(element: Element) -> int | None:
 
 
 def children(element: Element) -> list[Element]:
-    """The child elements, without comments."""
+    """Return the child elements, without comments."""
     return [child for child in element if isinstance(child.tag, str)]
 
 
 def canonical(element: Element) -> str:
-    """An element as one line of text that means the same; stable when written and read again."""
+    """Return an element as one line of text with the same meaning; stable when written and read again."""
     copy = etree.fromstring(etree.tostring(element, with_tail=False, encoding="utf-8"), _parser())
     for part in copy.iter():
         if part.text is not None and not part.text.strip():
@@ -268,14 +267,14 @@ def canonical(element: Element) -> str:
 
 
 def new(tag: str, *children: Element, **attributes: str) -> Element:
-    """An element with its attributes and child elements."""
+    """Return an element with its attributes and child elements."""
     element = etree.Element(tag, attributes)
     element.extend(children)
     return element
 
 
 def unknown(element: Element, attributes: Iterable[str], tags: Iterable[str]) -> tuple[str, ...]:
-    """What this project does not know of an element: ``@name=value`` for attributes, then child elements."""
+    """Return the unknown parts of an element: ``@name=value`` for attributes, then child elements."""
     known_attributes, known_tags = set(attributes), set(tags)
     given = sorted((str(name), str(value)) for name, value in element.attrib.items() if name != PLACES)
     found = [f"@{name}={value}" for name, value in given if name not in known_attributes]
@@ -283,7 +282,7 @@ def unknown(element: Element, attributes: Iterable[str], tags: Iterable[str]) ->
 
 
 def restore(element: Element, fragments: Iterable[str]) -> None:
-    """Put back what :func:`unknown` kept."""
+    """Put back the parts that :func:`unknown` returned."""
     for fragment in fragments:
         if attribute := _ATTRIBUTE.fullmatch(fragment):
             element.set(attribute["name"], attribute["value"])
@@ -292,7 +291,7 @@ def restore(element: Element, fragments: Iterable[str]) -> None:
 
 
 def parse_fragment(fragment: str) -> Element:
-    """The element of a kept fragment; raises :class:`BadRequest` where it is none."""
+    """Return the element of a kept fragment. Raises :class:`BadRequest` if it is not XML."""
     try:
         return etree.fromstring(fragment.encode(), _parser())
     except etree.XMLSyntaxError as error:
@@ -300,6 +299,6 @@ def parse_fragment(fragment: str) -> Element:
 
 
 def text_of(root: Element) -> str:
-    """A document as text, indented by two spaces."""
+    """Return a document as text, indented by two spaces."""
     etree.indent(root, "  ")
     return '<?xml version="1.0" encoding="utf-8"?>\n' + etree.tostring(root, encoding="unicode") + "\n"

@@ -2,7 +2,7 @@
 
 In every robot the base frame is the world's, z upwards; the R axis of arm i is horizontal and normal to
 [cos θ_i, sin θ_i, 0], and its coordinate grows with q_i of MMT (B.2). All constructors place the platform first and
-compute the arms or sliders from it, so that the rods have exactly the length that was asked for. Lengths in m.
+compute the arms or sliders from it, so that the rods have exactly the given length. Lengths in m.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ def quattro_rigid(
     """The Quattro with a rigid platform, 4-R̲-{2-SS}: three translations, four motors (IROS II-A, IV-A).
 
     l₁, l₂, A_i = 0.296 [cos θ_i, sin θ_i, 0] and PC_i = 0.102 [cos θ_i, sin θ_i, 0] are printed in IROS IV-A; the rods'
-    distance and the home pose are free choices. Parameters as in :func:`delta`.
+    distance and the zero configuration are free choices. Parameters as in :func:`delta`.
     """
     P = np.asarray(home, dtype=float)
     legs = [_on_arm(a, base_radius, P + polar(platform_radius, a), proximal, distal) for a in QUATTRO_ANGLES]
@@ -251,7 +251,7 @@ def uranesx(
 ) -> Mechanism:
     """The UraneSX, 3-P̲-{2-SS} with parallel rails along z: three translations (MMT 4.3, reference [48]).
 
-    The translation along the rails cannot be seen in the legs' directions. Parameters as in :func:`delta`; the rails
+    The legs' directions do not show the translation along the rails. Parameters as in :func:`delta`; the rails
     stand on a circle of ``base_radius``.
     """
     P = np.asarray(home, dtype=float)
@@ -271,11 +271,11 @@ def i4l(
     """The I4L, 4-P̲-{2-SS}: rails along x, a platform of two plates that slide on each other along y (MMT 4.3).
 
     Plate 12 carries legs 1 and 2, which come from the side of negative x, ``platform`` carries legs 3 and 4, from
-    positive x; both keep their orientation, and a passive P along y joins them. The mechanism has four freedoms:
-    three translations of the platform, and the slide of plate 12 on it. In the robot of reference [44] a rack and
-    pinion turns that slide into a rotation of the tool; it is left out here, so the platform's twist has three
-    freedoms, and the directions of legs 1 and 2 also depend on the slide. The translation along the rails cannot be
-    seen in the legs' directions.
+    positive x; both keep their orientation, and a passive P along y joins them. The mobility is four: three
+    translations of the platform, and the translation of plate 12 on it. In the robot of reference [44] a rack and
+    pinion converts that into a rotation of the tool; it is left out here, so the platform has three dof, and the
+    directions of legs 1 and 2 also depend on plate 12. The legs' directions do not show the translation along the
+    rails.
 
     Parameters
     ----------
@@ -317,8 +317,8 @@ def three_ruu(
 ) -> Mechanism:
     """Tsai and Joshi's 3-R̲UU: three translations (MMT 4.2.2, reference [45]).
 
-    In each leg the first axis of the elbow's U and the last axis of the wrist's U are parallel to the base R, and the
-    two inner axes are parallel to each other. Parameters as in :func:`delta`.
+    In each leg the first axis of the elbow's U and the last axis of the platform's U are parallel to the base R, and
+    the two inner axes are parallel to each other. Parameters as in :func:`delta`.
     """
     P = np.asarray(home, dtype=float)
     legs = [_on_arm(a, base_radius, P + polar(platform_radius, a), proximal, distal) for a in THREE_ANGLES]
@@ -335,7 +335,7 @@ def three_puu(
 ) -> Mechanism:
     """Tsai and Joshi's 3-P̲UU with inclined rails: three translations (MMT 4.2.2, reference [45]).
 
-    In each leg the first axis of the elbow's U and the last axis of the wrist's U are parallel (tangential), and so
+    In each leg the first axis of the elbow's U and the last axis of the platform's U are parallel (tangential), and so
     are the two inner axes. Parameters as in :func:`linear_delta`.
     """
     P = np.asarray(home, dtype=float)
@@ -354,7 +354,7 @@ def hexa(
     home: ArrayLike = (0.02, -0.01, -0.6),
     twist: float = math.radians(5),
 ) -> Mechanism:
-    """The Hexa, 6-R̲US: six freedoms (MMT 4.2.2, reference [46]).
+    """The Hexa, 6-R̲US: six dof (MMT 4.2.2, reference [46]).
 
     The first axis of each elbow's U is parallel to the base R.
 
@@ -383,9 +383,9 @@ def hexaglide(
     home: ArrayLike = (0.0, 0.02, -0.35),
     twist: float = math.radians(20),
 ) -> Mechanism:
-    """The Hexaglide, 6-P̲US with six parallel rails along x: six freedoms (MMT 4.2.2, reference [47]).
+    """The Hexaglide, 6-P̲US with six parallel rails along x: six dof (MMT 4.2.2, reference [47]).
 
-    The translation along the rails cannot be seen in the legs' directions. The first axis of each elbow's U is y.
+    The legs' directions do not show the translation along the rails. The first axis of each elbow's U is y.
 
     Parameters
     ----------
@@ -413,7 +413,7 @@ def six_pus(
     home: ArrayLike = (0.02, -0.01, -0.4),
     twist: float = math.radians(10),
 ) -> Mechanism:
-    """A 6-P̲US with inclined rails: six freedoms (MMT 4.2.2).
+    """A 6-P̲US with inclined rails: six dof (MMT 4.2.2).
 
     Rail i starts at A_i and descends outwards by ``slope`` (rad) below the horizontal; the first axis of each elbow's
     U is tangential. Other parameters as in :func:`hexa`.

@@ -1,4 +1,4 @@
-"""Formations: several bodies that nothing joins, and the bearings and distances between them."""
+"""Formations: several bodies without joints between them, and the bearings and distances between them."""
 
 from __future__ import annotations
 
@@ -35,15 +35,15 @@ def formation(
     """Bodies b1, b2 … with their frames at ``places`` (n, 3), metres, each with a camera there.
 
     A bearing (i, j) is the direction of body j in the camera's frame on body i, counted from 1; a distance is that of
-    their origins. ``bodies`` says what each can do (:data:`MOVES`); ``turns`` (n, 3, 3) are their orientations at zero,
-    ``frame`` (3, 3) that of the common frame. Raises ``BadRequest``.
+    their origins. ``bodies`` gives the motion of each (:data:`MOVES`); ``turns`` (n, 3, 3) are their orientations at
+    zero, ``frame`` (3, 3) that of the common frame. Raises ``BadRequest``.
 
     >>> square = formation([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 1)], [(1, 2), (2, 3), (3, 4), (4, 1)])
     >>> square.bodies
     ('b1', 'b2', 'b3', 'b4')
     """
     if bodies not in MOVES:
-        raise BadRequest("what the bodies of a formation can do", bodies, ", ".join(MOVES))
+        raise BadRequest("motion of the bodies of a formation", bodies, ", ".join(MOVES))
     count, axes = len(places), np.eye(3) if frame is None else np.asarray(frame, dtype=float)
     builder = Builder(name)
     builder.link("ground")

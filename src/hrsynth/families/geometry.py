@@ -1,4 +1,4 @@
-"""Where joints lie once the platform's pose is chosen: points on circles and lines, in closed form."""
+"""Places of joints for a chosen platform pose: points on circles and lines, in closed form."""
 
 from __future__ import annotations
 

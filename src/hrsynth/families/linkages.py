@@ -1,7 +1,7 @@
-"""Single loops of revolute joints that move although Kutzbach's formula says that they do not.
+"""Single loops of revolute joints that move although Kutzbach's formula predicts that they do not.
 
 Given by Denavit and Hartenberg's parameters, each link from one joint's axis to the next: length a (m), twist α (rad),
-offset d (m). The default dimensions are free choices. The one freedom of each is a theorem of its discoverer.
+offset d (m). The default dimensions are free choices. The mobility 1 of each is a theorem of its discoverer.
 """
 
 from __future__ import annotations

@@ -50,7 +50,7 @@ def gough_stewart(
     twist: float = math.radians(-25),
     tilt: float = math.radians(2),
 ) -> Mechanism:
-    """The Gough-Stewart platform, 6-UP̲S on two semi-regular hexagons: six freedoms (MMT 4.2.1, reference [14]).
+    """The Gough-Stewart platform, 6-UP̲S on two semi-regular hexagons: six dof (MMT 4.2.1, reference [14]).
 
     The first axis of each base U is tangential and fixed in the base, the second is fixed in the cylinder, normal to
     the leg.
@@ -87,7 +87,7 @@ def three_upu(
 def three_rps(*, base_radius: float = 0.4, platform_radius: float = 0.15, height: float = 0.3) -> Mechanism:
     """The 3-RP̲S with tangential base R: a height and two tilts (MMT 4.2.1, reference [41]).
 
-    The other three freedoms move along a little (parasitic motions).
+    The other three coordinates change a little with them (parasitic motions).
 
     ``height``: of P, above the base's origin, at the zero configuration. Other parameters as in :func:`gough_stewart`.
     """

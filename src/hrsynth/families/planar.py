@@ -1,6 +1,6 @@
-"""The planar robots of MMT Table 1, with two and three degrees of freedom, moving in the plane z = 0 of the base.
+"""The planar robots of MMT Table 1, with two and three dof, moving in the plane z = 0 of the base.
 
-A leg is a chain base – ``prox_i`` – ``dist_i`` – platform with three joints of type R (axis z) or P. Joint names say
+A leg is a chain base – ``prox_i`` – ``dist_i`` – platform with three joints of type R (axis z) or P. Joint names give
 the place and the type: ``shoulder_i`` (R) or ``guide_i`` (P) on the base, ``elbow_i`` (R) or ``slide_i`` (P) between
 the two links, ``wrist_i`` (R) or ``slide_i`` (P) on the platform. All dimensions are free choices (the papers give
 none): generic ones, so that neither the robots nor their hidden robots are near a singularity at the zero
@@ -69,7 +69,7 @@ def _elbow(A: Array, C: Array, proximal: float, distal: float, left: bool) -> Ar
     return on_circle(A, side, unit(C - A), proximal, C, distal, outward=True)
 
 
-# ------------------------------------------------------------------------------------------ two degrees of freedom
+# ---------------------------------------------------------------------------------------------------------- two dof
 
 
 def _pair(name: str, types: str, legs: Sequence[_PlanarLeg], motor: int, point_body: bool = False) -> Mechanism:
@@ -195,16 +195,16 @@ def prrrp_parallel(
     home: tuple[float, float] = (0.03, 0.1),
     point_body: bool = False,
 ) -> Mechanism:
-    """P̲RRRP̲ with both rails along y: the translation along them cannot be seen in the legs (MMT 4.3, Fig. 17).
+    """P̲RRRP̲ with both rails along y: the legs do not show the translation along them (MMT 4.3, Fig. 17).
 
-    ``point_body``: the platform is a separate link on two coaxial R at the end joint (its spin is idle), instead of
-    the last segment of leg 1. Other parameters as in :func:`prrrp`.
+    ``point_body``: the platform is a separate link on two coaxial R at the end joint (its spin is an internal motion),
+    instead of the last segment of leg 1. Other parameters as in :func:`prrrp`.
     """
     name = "prrrp_parallel_point" if point_body else "prrrp_parallel"
     return _prrrp(name, 1, base_distance, (math.pi / 2, math.pi / 2), distal, home, point_body)
 
 
-# ---------------------------------------------------------------------------------------- three degrees of freedom
+# -------------------------------------------------------------------------------------------------------- three dof
 
 
 def _corners(base: Pairs, platform: Pairs, home: Pose) -> list[tuple[Array, Array]]:
@@ -234,7 +234,7 @@ def three_rrr(
     platform: Pairs = PLATFORM,
     home: Pose = HOME,
 ) -> Mechanism:
-    """3-RRR: three planar freedoms (MMT 4.1.1, Table 1; Fig. 6).
+    """3-RRR: three planar dof (MMT 4.1.1, Table 1; Fig. 6).
 
     Parameters
     ----------
@@ -259,7 +259,7 @@ def six_poses(
 ) -> Mechanism:
     """3-RRR that hides the six poses of C. Innocenti and V. Parenti-Castelli's 3-RPR (1992, reprinted in many places).
 
-    With the directions of its rods held the corners of the platform, a triangle of 17.04, 16.54 and 20.84 cm, are
+    With the directions of its rods fixed the corners of the platform, a triangle of 17.04, 16.54 and 20.84 cm, are
     14.98, 15.38 and 12 cm from (0, 0), (15.91, 0) and (0, 10): those are the lengths of its cranks.
 
     Parameters
@@ -267,7 +267,7 @@ def six_poses(
     motor
         The actuated joint of each leg, 1 or 2: 3-R̲RR or 3-RR̲R.
     rods
-        Lengths of the watched links.
+        Lengths of the observed links.
     directions
         Their directions at the zero configuration (rad), elbow to platform.
     """
@@ -285,7 +285,7 @@ def six_poses(
 
 
 def three_rpr(*, motor: int = 1, base: Pairs = BASE, platform: Pairs = PLATFORM, home: Pose = HOME) -> Mechanism:
-    """3-RPR: three planar freedoms (MMT 4.1.1, Table 1).
+    """3-RPR: three planar dof (MMT 4.1.1, Table 1).
 
     ``motor`` 1: 3-R̲PR; 2: 3-RP̲R. Other parameters as in :func:`three_rrr`.
     """
@@ -302,7 +302,7 @@ def three_prr(
     platform: Pairs = PLATFORM,
     home: Pose = HOME,
 ) -> Mechanism:
-    """3-PRR: three planar freedoms (MMT 4.1.1, Table 1).
+    """3-PRR: three planar dof (MMT 4.1.1, Table 1).
 
     Parameters
     ----------
@@ -338,7 +338,7 @@ def three_prp(
     platform: Pairs = PLATFORM,
     home: Pose = HOME,
 ) -> Mechanism:
-    """3-P̲RP: three planar freedoms, of which the legs show the rotation only (MMT 4.1.1, Table 1).
+    """3-P̲RP: three planar dof, of which the legs show the rotation only (MMT 4.1.1, Table 1).
 
     Parameters
     ----------
@@ -365,7 +365,7 @@ def three_rrp(
     platform: Pairs = PLATFORM,
     home: Pose = HOME,
 ) -> Mechanism:
-    """3-R̲RP: three planar freedoms, of which the legs show the rotation only (MMT 4.1.1, Table 1).
+    """3-R̲RP: three planar dof, of which the legs show the rotation only (MMT 4.1.1, Table 1).
 
     Parameters
     ----------
@@ -392,7 +392,7 @@ def three_ppr(
     platform: Pairs = PLATFORM,
     home: Pose = HOME,
 ) -> Mechanism:
-    """3-PPR: three planar freedoms, legs whose last segments never turn: nothing can be seen (MMT 4.1.1, Table 1).
+    """3-PPR: three planar dof, legs whose last segments never rotate: they show nothing (MMT 4.1.1, Table 1).
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from . import delta, npod, planar
 
 @dataclass(frozen=True)
 class Shipped:
-    """One shipped robot: its file's name, its constructor, and what a reader wants to know before opening it."""
+    """Shipped robot: its file's name, its constructor, and its main data."""
 
     name: str
     """File name without ``.urdf``, and the mechanism's name."""
@@ -77,7 +77,7 @@ ROBOTS: tuple[Shipped, ...] = tuple(
                 "4-R*-{2-SS}",
                 3,
                 "IROS II-A",
-                "IROS IV-A; distance of the rods and home pose: free choice",
+                "IROS IV-A; distance of the rods and zero configuration: free choice",
             ),
             Shipped(
                 "quattro",
@@ -85,7 +85,7 @@ ROBOTS: tuple[Shipped, ...] = tuple(
                 "4-R*-{2-SS}",
                 4,
                 "MMT 4.2.2, Figs. 12-14",
-                "MMT Appendix B.1; distance of the rods and home pose: free choice",
+                "MMT Appendix B.1; distance of the rods and zero configuration: free choice",
             ),
             Shipped("orthoglide", delta.orthoglide, "3-P*-{2-SS}", 3, _DELTA, _FREE),
             Shipped("linear_delta", delta.linear_delta, "3-P*-{2-SS}", 3, _DELTA, _FREE),

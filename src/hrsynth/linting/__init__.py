@@ -1,1 +1,1 @@
-"""What is wrong, doubtful or lost in robot files: rules by name, each with its mend."""
+"""Lint: defects, doubts and losses in robot files; rules by name, each with its fix."""

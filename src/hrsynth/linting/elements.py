@@ -1,4 +1,4 @@
-"""What all XML dialects say of links and joints in their own words: masses with inertias, limits, names."""
+"""Links and joints in documents of all XML formats: masses with inertias, limits, names."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from ..geometry.vectors import Array
 from .linted_file import LintedFile
 
 ENTRIES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-"""Where MJCF's six numbers stand in the matrix."""
+"""Places of MJCF's six numbers in the matrix."""
 NAMES = {(0, 0): "ixx", (1, 1): "iyy", (2, 2): "izz", (0, 1): "ixy", (0, 2): "ixz", (1, 2): "iyz"}
 
 
 def number(text: str | None) -> float | None:
-    """The number that a text is, None for what is none."""
+    """Return the number of a text, None if it is not a number."""
     try:
         return None if text is None else float(numerals.parse(text, 1)[0])
     except ValueError:
@@ -27,7 +27,7 @@ def number(text: str | None) -> float | None:
 
 @dataclass(frozen=True, eq=False)
 class NumberAt:
-    """A number in a document: an attribute (one of its words), or the text of an element."""
+    """Number in a document: an attribute (one of its words), or the text of an element."""
 
     element: xml.Element
     attribute: str | None = None
@@ -35,17 +35,17 @@ class NumberAt:
 
     @property
     def text(self) -> str | None:
-        """As it is written."""
+        """Text as it is written."""
         whole = self.element.get(self.attribute) if self.attribute else (self.element.text or "").strip() or None
         return whole if whole is None or self.word is None else whole.split()[self.word]
 
     @property
     def value(self) -> float | None:
-        """The number, None where it is none."""
+        """Number, None if it is not one."""
         return number(self.text)
 
     def put(self, text: str) -> None:
-        """Write another one."""
+        """Write another text."""
         if self.word is not None:
             words = ((self.element.get(self.attribute) if self.attribute else self.element.text) or "").split()
             words[self.word] = text
@@ -58,8 +58,8 @@ class NumberAt:
 
 @dataclass(frozen=True, eq=False)
 class InertialElement:
-    """What a document says of a link's mass: the element, where the mass stands, the inertia (3, 3) about the centre of
-    mass (None where there is none, or no numbers), and what writes another."""
+    """Mass of a link in a document: the element, the mass, the inertia (3, 3) about the centre of mass (None if absent
+    or not numbers), and the function that writes another."""
 
     link: str
     element: xml.Element
@@ -69,7 +69,7 @@ class InertialElement:
 
 
 def inertials(file: LintedFile) -> Iterator[InertialElement]:
-    """All inertial elements of a document, in order."""
+    """Yield all inertial elements of a document, in order."""
     if file.root is None or file.dialect is None:
         return
     tag = {"urdf": "link", "sdf": "link", "mjcf": "body"}[file.dialect]
@@ -135,8 +135,8 @@ def _matrix(words: list[str | None]) -> Array | None:
 
 @dataclass(frozen=True, eq=False)
 class LimitElement:
-    """The limits of a joint as a document gives them: its name and type, the element of the joint and of the limits,
-    the two bounds (None where one is not given)."""
+    """Limits of a joint in a document: its name and type, the element of the joint and of the limits, the two bounds
+    (None if absent)."""
 
     joint: str
     kind: str
@@ -147,18 +147,18 @@ class LimitElement:
 
     @property
     def turns(self) -> bool:
-        """Whether the coordinate is an angle."""
+        """Coordinate is an angle."""
         return self.kind in ("revolute", "hinge", "continuous")
 
     @property
     def bounds(self) -> tuple[float, float] | None:
-        """Both numbers."""
+        """Both bounds."""
         found = [None if each is None else each.value for each in (self.lower, self.upper)]
         return None if found[0] is None or found[1] is None else (found[0], found[1])
 
 
 def limits(file: LintedFile) -> Iterator[LimitElement]:
-    """All limits of joints in a document that are written there, in order; MJCF's in its own unit."""
+    """Yield all limits of joints in a document, in order; MJCF's in its own unit."""
     for joint in joints(file):
         name, kind = joint.get("name") or "", joint.get("type", "hinge" if file.dialect == "mjcf" else "")
         if file.dialect == "mjcf":
@@ -180,7 +180,7 @@ def limits(file: LintedFile) -> Iterator[LimitElement]:
 
 
 def joints(file: LintedFile) -> list[xml.Element]:
-    """The elements that say what a joint is: of the tree, loops, those of a plugin's own."""
+    """Return the elements of joints: of the tree, loops, and those of plugins."""
     if file.root is None:
         return []
     if file.dialect == "urdf":

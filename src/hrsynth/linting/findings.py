@@ -1,4 +1,4 @@
-"""What a rule of ``lint`` is, and what it finds: data that every output shows in its own way."""
+"""Rules of ``lint`` and their findings: data that every output shows in its own way."""
 
 from __future__ import annotations
 
@@ -13,15 +13,14 @@ if TYPE_CHECKING:
     from .linted_file import LintedFile
 
 SEVERITIES = ("note", "warning", "error")
-"""From the mildest to the worst."""
+"""Function that changes the file's document in place."""
 Fix = Callable[[], None]
 """Changes the file's document in place."""
 
 
 @dataclass(frozen=True)
 class RuleHit:
-    """Where a rule found something: the line, what is there, what mends it (None where a person must decide), and the
-    advice where it is another than the rule's own."""
+    """Hit of a rule: line, message, fix (None if a person must decide), and advice if it differs from the rule's."""
 
     line: int | None
     message: str
@@ -32,8 +31,8 @@ class RuleHit:
 
 @dataclass(frozen=True)
 class LintRule:
-    """A rule: its name, how bad it is, what it says in a few words, why that matters, what to do; ``mends`` says
-    whether ``--fix`` does it (where there is one way to). ``find`` looks for it in a file that was opened."""
+    """Rule: name, severity, title, explanation, advice; ``fixable`` if ``--fix`` can apply it (there is only one way).
+    ``find`` yields its hits in an opened file."""
 
     name: str
     severity: str
@@ -49,22 +48,22 @@ class LintRule:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Finding(Value, all_recorded=True):
-    """One thing that is wrong, doubtful or lost, with its file and line and what to do about it."""
+    """Finding: a defect, doubt or loss in a file, with its line and the advice."""
 
     rule: str
     severity: Annotated[str, Literal["error", "warning", "note"]]
     file: str
     line: Annotated[int | None, "null if it concerns the whole file"]
     message: str
-    advice: Annotated[str | None, As("fix"), "what to do about it"] = None
-    fixable: Annotated[bool, "whether --fix mends it"] = False
+    advice: Annotated[str | None, As("fix"), "advice"] = None
+    fixable: Annotated[bool, "true if --fix can apply it"] = False
 
     @property
     def rank(self) -> int:
-        """How bad it is: 0 a note, 2 an error."""
+        """Severity as a number: 0 a note, 2 an error."""
         return SEVERITIES.index(self.severity)
 
     @property
     def where(self) -> str:
-        """File and line."""
+        """File and line as a text."""
         return self.file if self.line is None else f"{self.file}:{self.line}"

@@ -1,7 +1,7 @@
-"""Freedoms of a mechanism at closed configurations near its zero: of all, with parts left out, with links held.
+"""Mobility of a mechanism at closed configurations near its zero: of all, with parts left out, with links locked.
 
-Every count is a rank of the loops' constraints with its gap; at several configurations it must be the same, else
-nothing is said.
+Every count is a rank of the loops' constraints with its gap; it must be equal at several configurations, else it is
+None.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ Pair = tuple[str, str]
 
 @dataclass(frozen=True, eq=False)
 class NearbyFreedoms:
-    """A mechanism at closed configurations near its zero one."""
+    """Mechanism at closed configurations near its zero one."""
 
     mechanism: Mechanism
 
     @cached_property
     def assembly(self) -> LoopAssembly:
-        """Its own loops."""
+        """Loop equations of the mechanism."""
         return LoopAssembly.of(self.mechanism)
 
     @cached_property
     def configurations(self) -> tuple[Values, ...]:
-        """Closed values some way from zero along random motions; zero alone where nothing moves or closes."""
+        """Closed values near zero along random motions; zero alone if nothing moves or closes."""
         zero = self.assembly.zero()
         if self.assembly.size > MOST_LOOP_COORDINATES:
             return ()
@@ -55,8 +55,8 @@ class NearbyFreedoms:
         return tuple(found) or (zero,)
 
     def count(self, without: Collection[str] = (), held: Collection[Pair] = ()) -> int | None:
-        """The freedoms where joints that close loops (or gears) are left out, and pairs of links held as they stand;
-        None where they are not the same at all configurations, or a rank is not clear."""
+        """Return the mobility without some closures (or couplings), and with pairs of links locked; None if it differs
+        between the configurations, or a rank is unclear."""
         found = set(self._counts(without, held))
         return found.pop() if len(found) == 1 else None
 
@@ -73,14 +73,14 @@ class NearbyFreedoms:
 
     @cached_property
     def point(self) -> Array | None:
-        """The point that the platform is, in its frame, where its turn is idle (docs/pages/theory.md, section 1)."""
+        """Point of the platform, in its frame, if its rotation is not controlled (docs/pages/theory.md, section 1)."""
         try:
             return decompose(normal_form(self.mechanism).mechanism).point
         except HrsynthError:
             return None
 
     def _lock(self, name: str, pair: Pair, poses: dict[str, Array]) -> JointSpec:
-        """What holds two links as they stand; of a platform that is a point, that point."""
+        """Return the joint that locks two links; for a platform that is a point, that point."""
         one, two = pair
         at, kind = np.eye(4), JointType.FIXED
         if pair == (self.mechanism.base, self.mechanism.platform) and self.point is not None:
@@ -90,15 +90,15 @@ class NearbyFreedoms:
 
     @property
     def closures(self) -> list[str]:
-        """The joints that close loops, and the gears."""
+        """Joints that close loops, and couplings."""
         return [
             *(joint.name for joint in self.mechanism.joints.values() if not joint.in_tree),
             *(gear.name for gear in self.mechanism.couplings),
         ]
 
     def dead(self) -> Iterator[str]:
-        """Closures and gears without which the mechanism is as free as with them, the last of the file first; each
-        without those before it."""
+        """Yield closures and couplings that do not change the mobility, the last of the file first; each without those
+        before it."""
         whole, gone = self.count(), list[str]()
         for name in reversed(self.closures) if whole is not None else ():
             if self.count([*gone, name]) == whole:
@@ -106,7 +106,8 @@ class NearbyFreedoms:
                 yield name
 
     def redundant(self, rows: Callable[[str], int]) -> dict[str, int]:
-        """How many of a closure's constraints (it has ``rows`` of them) repeat what those before it say."""
+        """Return the number of a closure's constraints (it has ``rows`` of them) that are redundant with those before
+        it."""
         gone = self.closures
         before, found = self.count(gone), dict[str, int]()
         for name in self.closures:
@@ -120,7 +121,7 @@ class NearbyFreedoms:
         return found
 
     def platform(self, held: Collection[Pair] = ()) -> int | None:
-        """The freedoms of the platform where other links are held."""
+        """Return the platform dof with other links locked."""
         whole = self.count(held=held)
         rest = self.count(held=[*held, (self.mechanism.base, self.mechanism.platform)])
         return None if whole is None or rest is None else whole - rest

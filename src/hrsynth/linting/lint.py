@@ -1,4 +1,4 @@
-"""``lint``: all rules on files of robots, what they find, and the files mended."""
+"""``lint``: rules applied to robot files, their findings, and fixed files."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .rules.readers import PROGRAMS
 
 
 class LintCounts(TypedDict):
-    """How many findings are of each severity."""
+    """Number of findings of each severity."""
 
     error: int
     warning: int
@@ -29,7 +29,7 @@ class LintCounts(TypedDict):
 
 
 class Unread(NamedTuple):
-    """A file that could not be opened, or is no document, and why."""
+    """File that could not be read, and the reason."""
 
     file: str
     line: int | None
@@ -38,18 +38,17 @@ class Unread(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Lint(Result, shown_as="lint"):
-    """What was found in which files, and what was mended and where that is written; ``unread``: why others of several
-    files could not be opened."""
+    """Findings in files, the fixes made and the file they are written to; ``unread``: defects of unreadable files."""
 
     files: Recorded[tuple[str, ...]]
     findings: Recorded[tuple[Finding, ...]]
-    mended: Annotated[tuple[Finding, ...], "what --fix did"] = ()
-    written: Annotated[str | None, As("file"), "where the result is written"] = None
+    fixed: Annotated[tuple[Finding, ...], "findings that --fix corrected"] = ()
+    written: Annotated[str | None, As("file"), "path of the fixed file"] = None
     rules: tuple[str, ...] = field(default=(), repr=False)
     unread: tuple[Defect, ...] = ()
 
     def headline(self) -> str:
-        """How much was found."""
+        """Number of files and findings."""
         counts = self.counts
         found = ", ".join(f"{counts[name]} {name}{'s' * (counts[name] != 1)}" for name in reversed(SEVERITIES))
         unread = len({each.file for each in self.unread})
@@ -60,11 +59,11 @@ class Lint(Result, shown_as="lint"):
     @property
     @recorded(LintCounts)
     def counts(self) -> dict[str, int]:
-        """How many findings are of each severity."""
+        """Number of findings of each severity."""
         return {name: sum(each.severity == name for each in self.findings) for name in SEVERITIES}
 
     def reaches(self, severity: str) -> bool:
-        """Whether a finding is at least that bad; a file that cannot be read is."""
+        """Return True if a finding is at least that severe; an unread file is."""
         return bool(self.unread) or any(each.rank >= SEVERITIES.index(severity) for each in self.findings)
 
     unread_record = Shown(
@@ -82,32 +81,55 @@ def lint(
     output: str | Path | None = None,
     **said: Any,
 ) -> Lint:
-    """Everything that is wrong, doubtful or lost in robot files, by the rules of ``hrsynth.linting.rules``.
+    """Check robot files by the rules of ``hrsynth.linting.rules`` and return their findings.
 
-    ``compare`` is another file of the same robot: differences between the two are reported too. ``program`` names
-    programs that should read the files: a closure that one of them loses is an error. ``ignore`` names rules to leave
-    out. With ``fix`` everything that can be mended in only one way is mended, and the file is written, completely or
-    not at all, to ``output`` or over the original (no link that is not named); the findings are then those that remain.
-    What no file says is given as for ``load`` (``platform``, ``close`` …).
+    Parameters
+    ----------
+    files
+        Robot files or names of robots.
+    compare
+        Another file of the same robot, whose differences are reported too.
+    program
+        Programs that should read the files: a closure that one of them loses is an error.
+    ignore
+        Rules to leave out.
+    fix
+        Apply all fixes that are unique, and write the file, completely or not at all. The findings are then those that
+        remain.
+    output
+        File to write instead of the original (a link is not followed unless it is named).
+    **said
+        File overrides as in ``load`` (``platform``, ``close`` …).
 
-    Of several files those that cannot be opened, or are no documents, are told in ``unread``. Raises ``BadRobotFile``
-    if there is no other; ``BadRequest`` for unknown names, for several files with ``output``, and if the file cannot be
-    written.
+    Returns
+    -------
+    Lint
+        Findings with their files and lines. ``unread`` lists those of several files that cannot be read.
 
+    Raises
+    ------
+    BadRobotFile
+        If none of the files can be read.
+    BadRequest
+        For unknown names, for ``output`` without ``fix`` or with several files, and for a file that cannot be written.
+
+    Examples
+    --------
     >>> hrsynth.lint("3rrr_m1")
     <Lint: 1 file: 0 errors, 0 warnings, 6 notes>
     """
+
     require_keywords(lint, said, (each.name for each in fields(Overrides)))
     paths = list(files) if isinstance(files, Iterable) and not isinstance(files, str) else [files]
     skipped, programs = names(ignore) or (), tuple(names(program) or ())
     for what, asked, known in (("rule", skipped, tuple(lint_rules())), ("program", programs, PROGRAMS)):
         unknown = [name for name in asked if name and name not in known]
         if unknown:
-            raise BadRequest(f"no {what} of this name", unknown[0], known)
+            raise BadRequest(f"unknown {what}", unknown[0], known)
     if not paths:
-        raise BadRequest("no file to look at", None, "one or more")
+        raise BadRequest("no file given", None, "one or more")
     if output is not None and (not fix or len(paths) > 1):
-        raise BadRequest("an output is the mended file", str(output), "one file with --fix")
+        raise BadRequest(f"--output {output}: needs --fix and one file", remedy="Name one file, or omit --output.")
     if output is not None:
         require_writable(output)
     given = Overrides.said(**said)
@@ -128,9 +150,9 @@ def lint(
             require_writable(target)
             if output is None and target not in named and target.is_symlink():
                 raise BadRequest(
-                    "nothing is mended: a file that was not named is a link",
+                    "nothing is fixed: a file is reached by a link",
                     str(target),
-                    "the file itself, named, or --output",
+                    remedy="Name the file itself, or use --output.",
                 )
         for target, data in new:
             write_whole(target, data)
@@ -149,8 +171,8 @@ def lint(
 
 
 def findings(file: LintedFile, ignore: Sequence[str] = ()) -> list[tuple[Finding, Fix | None]]:
-    """What the rules find in a file and what mends it, by line, the worst of a line first; what is told by a rule of
-    its own is not told again as refused."""
+    """Return the findings in a file and their fixes, by line, the most severe of a line first; a refusal that another
+    rule reports is left out."""
     found = []
     for rule in lint_rules().values():
         for spot in rule.find(file) if rule.name not in ignore else ():
@@ -180,8 +202,7 @@ def findings(file: LintedFile, ignore: Sequence[str] = ()) -> list[tuple[Finding
 
 
 def _mend_file(file: LintedFile, ignore: Sequence[str]) -> tuple[LintedFile, list[Finding]]:
-    """The file with all mends, and what they mended: round by round, as one may uncover or undo the cause of
-    another."""
+    """Return the file with all fixes, and the fixed findings: in rounds, as one may uncover or undo another."""
     gone: list[Finding] = []
     for _ in range(MOST_MENDING):
         found = [(each, mend) for each, mend in findings(file, ignore) if mend is not None]

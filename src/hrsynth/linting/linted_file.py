@@ -1,4 +1,4 @@
-"""A file that is looked at: its document, what the readers make of it, and what they refuse."""
+"""File under ``lint``: its document, its mechanism, and the reader's refusal."""
 
 from __future__ import annotations
 
@@ -22,17 +22,16 @@ from ..mechanism.model import Mechanism
 Found = TypeVar("Found")
 _HEAD = re.compile(rb"(?>\s|<\?.*?\?>|<!--.*?-->)*", re.DOTALL)
 _TAIL = re.compile(rb"</[^<>]*>((?>\s|<!--.*?-->)*)$", re.DOTALL)
-"""What stands before and after the root element."""
+"""Text before and after the root element."""
 DIALECTS = {"robot": "urdf", "mujoco": "mjcf", "sdf": "sdf"}
-"""The names of root elements, and what their documents are called here."""
+"""Formats by the names of their root elements."""
 
 
 class LintedFile:
-    """A robot file, opened once; ``text`` stands for its content where that is being mended. What a person says of it
-    (platform, base …) is in ``given``; ``readers`` are the programs that shall read it, ``other`` is a file of the same
-    robot.
+    """Robot file, opened once; ``text`` replaces its content after a fix. ``given`` are its overrides (platform,
+    base …); ``readers`` are the programs that shall read it, ``other`` is a file of the same robot.
 
-    Raises ``BadRobotFile`` for what cannot be opened, or is no document.
+    Raises ``BadRobotFile`` for a file that cannot be opened, or is not a document.
     """
 
     def __init__(
@@ -45,7 +44,9 @@ class LintedFile:
     ) -> None:
         self.given, self.readers, self.other = given or Overrides(), readers, other
         opened = robot_file(Path(path), strict=False)
-        if opened.root is None and isinstance(graph := formats.read(opened), JointGraph):  # settings beside a document
+        if opened.root is None and isinstance(
+            graph := formats.read(opened), JointGraph
+        ):  # a YAML file next to a document
             opened = robot_file(Path(graph.file), strict=False)
         self.path, self.file = opened.path, str(opened.path)
         self.data = xml.content(opened.path) if text is None else text
@@ -54,25 +55,25 @@ class LintedFile:
         self.expanded = (
             text is None and self.root is not None and xacro.is_needed(xml.document(self.data, self.file, []))
         )
-        """Whether a program made the document of what stands in the file, which no mend can be written to."""
+        """The document is the output of xacro, so no fix can be written to the file."""
         self._remembered: dict[str, Any] = {}
         self.dialect = None if self.root is None else DIALECTS.get(str(self.root.tag))
 
     def open(self, *, strict: bool = False) -> RobotFile:
-        """The file as readers get it, which may change its document."""
+        """Return the file for a reader, which may change its document."""
         return replace(
             self._opened, root=copy.deepcopy(self.root), strict=strict and not self.given.any, as_spelt=not strict
         )
 
     def graph(self) -> JointGraph:
-        """What the file says before anything is put together; raises ``BadRobotFile``."""
+        """Return the joint graph of the file before assembly. Raises ``BadRobotFile``."""
         found = formats.read(self.open())
         assert isinstance(found, JointGraph)
         return found
 
     @cached_property
     def said(self) -> JointGraph | None:
-        """The same, None where it is refused; nothing may change it."""
+        """Joint graph, None if it is refused; nothing may change it."""
         try:
             return self.graph()
         except HrsynthError:
@@ -87,13 +88,12 @@ class LintedFile:
 
     @property
     def refusal(self) -> HrsynthError | None:
-        """Why the file is not read as every command reads it."""
+        """Error with which every command refuses the file, or None."""
         return self._read if isinstance(self._read, HrsynthError) else None
 
     @cached_property
     def mechanism(self) -> Mechanism | None:
-        """The mechanism that every command reads; of a file that its own dialect refuses, what the tolerant reader
-        makes of it; None where there is none."""
+        """Mechanism that every command reads; if its format refuses the file, the tolerant reader's; else None."""
         if isinstance(self._read, Mechanism):
             return self._read
         try:
@@ -102,15 +102,15 @@ class LintedFile:
             return None
 
     def remember(self, name: str, make: Callable[[], Found]) -> Found:
-        """What is computed once for several rules."""
+        """Return a value that is computed once for several rules."""
         if name not in self._remembered:
             self._remembered[name] = make()
         found: Found = self._remembered[name]
         return found
 
     def element(self, line: int | None, *tags: str, name: str | None = None) -> xml.Element | None:
-        """The element with one of these tags that starts in a line of this file, where there is one only; of several in
-        one line that with the name."""
+        """Return the only element with one of these tags that starts in a line of this file; of several that with the
+        name."""
         if self.root is None or line is None or isinstance(line, xml.SourceLine):
             return None
         found = [each for each in self.root.iter(*tags) if xml.line(each) == line]
@@ -119,11 +119,11 @@ class LintedFile:
         return found[0] if len(found) == 1 else None
 
     def after(self) -> LintedFile:
-        """The file as its document is now."""
+        """Return the file with its current document."""
         return LintedFile(self.path, self.given, self.text(), self.readers, self.other)
 
     def text(self) -> bytes:
-        """The document as text."""
+        """Return the document as text."""
         from lxml import etree
 
         assert self.root is not None
@@ -133,7 +133,7 @@ class LintedFile:
 
 
 def defects_of(error: HrsynthError) -> list[tuple[int | None, str]]:
-    """Line and text of all that an error says."""
+    """Return line and text of all defects of an error."""
     if isinstance(error, BadRobotFile):
         return [(each.line, each.text) for each in error.defects]
     return [(None, " ".join(str(error).split()))]

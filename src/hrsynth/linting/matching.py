@@ -1,4 +1,4 @@
-"""Which joint and link of one file is which of another file of the same robot: by name, by place, by structure."""
+"""Match of the joints and links of two files of one robot: by name, by place, by structure."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ _ACROSS = (JointType.PRISMATIC, JointType.PLANAR)
 
 @dataclass(frozen=True, eq=False)
 class LinkFit:
-    """The rigid motion ``X`` (4, 4) that brings a link's joints in one robot to their places in the other, what it
-    leaves (characteristic lengths, radians) at each joint, and whether it is the only one."""
+    """Rigid motion ``X`` (4, 4) that brings a link's joints in one robot to their places in the other, the residual
+    (characteristic lengths, radians) at each joint, and True if it is the only one."""
 
     X: Array
     misses: Mapping[str, float]
@@ -82,7 +82,7 @@ class RobotMatch:
 
     @cached_property
     def links(self) -> dict[str, str]:
-        """Link of one: the link of the other that carries the most of its joints, of equal ones that with its name."""
+        """Link of one: the link of the other that carries most of its joints; among equals, the one with its name."""
         found = {}
         for link in self.one.links:
             votes: Counter[str] = Counter()
@@ -96,7 +96,7 @@ class RobotMatch:
         return found
 
     def _pairs(self, link: str) -> list[tuple[_JointOn, _JointOn]]:
-        """The joints of a link in both robots, as it carries them."""
+        """Return the joints of a link in both robots, as it carries them."""
         return [
             (_on(joint, link), _on(other, self.links[link]))
             for joint in self.one.joints_of(link)
@@ -106,7 +106,8 @@ class RobotMatch:
         ]
 
     def fit(self, link: str) -> LinkFit | None:
-        """How the joints of a link agree in both robots, wherever the link is at zero; None where it has none."""
+        """Return how the joints of a link agree in both robots, wherever the link is at zero; None without common
+        joints."""
         pairs = self._pairs(link)
         if not pairs:
             return None
@@ -121,13 +122,13 @@ class RobotMatch:
         return max(good, key=lambda each: float(np.trace(upright.T @ each.X[:3, :3])))
 
     def _fits(self, pairs: Sequence[tuple[_JointOn, _JointOn]], ways: Iterable[Sequence[float]]) -> list[LinkFit]:
-        """Those with the other robot's axes in each of these senses."""
+        """Yield the fits with the other robot's axes in each of these senses."""
         return [_fit(list(_turn_senses(pairs, signs)), self.one.length, None) for signs in ways]
 
     def apart(self, hinge: str) -> float:
-        """By how much (characteristic lengths) the links of a hinge lie elsewhere along its axis in the other robot:
-        no link shows that by itself, as a hinge may have its centre anywhere. 0 where the other joints of one of the
-        links do not tell it, or some way in which they fit fits."""
+        """Return the shift (characteristic lengths) of a revolute joint's links along its axis between the robots. No
+        link alone shows it, as the centre may be anywhere on the axis. 0 if the other joints do not determine it, or
+        some fit agrees."""
         joint = self.one.joints[hinge]
         if joint.type is not JointType.REVOLUTE or hinge not in self.joints:
             return 0.0
@@ -152,14 +153,14 @@ class RobotMatch:
 
     @cached_property
     def _upright(self) -> Array:
-        """How the other robot's base is turned, (3, 3)."""
+        """Rotation of the other robot's base, (3, 3)."""
         found = self.fit(self.one.base)
         return np.eye(3) if found is None else found.X[:3, :3]
 
 
 def _fit(pairs: Sequence[tuple[_JointOn, _JointOn]], length: float, upright: Array | None) -> LinkFit:
-    """The best fit of a link's joints; the centre of a hinge or slide is any point of its axis, slid to where both
-    agree."""
+    """Return the best fit of a link's joints; the centre of a revolute or prismatic joint may be any point of its
+    axis."""
     shift, X, only = np.zeros(len(pairs)), np.eye(4), False
     for _ in range(SLIDES):
         points = [(mine.point, their.point + s * _slide(their)) for (mine, their), s in zip(pairs, shift, strict=True)]
@@ -181,7 +182,7 @@ def _fit(pairs: Sequence[tuple[_JointOn, _JointOn]], length: float, upright: Arr
 
 @dataclass(frozen=True, eq=False)
 class _JointOn:
-    """A joint as a link carries it: of a U joint the axis that is fixed in the link, and the angle to the other one as
+    """Joint as a link carries it: of a U joint the axis that is fixed in the link, and the angle to the other one as
     its cosine without sign, as the axes have no sense."""
 
     name: str
@@ -206,15 +207,15 @@ def _on(joint: Joint, link: str) -> _JointOn:
 def _turn_senses(
     pairs: Sequence[tuple[_JointOn, _JointOn]], signs: Iterable[float]
 ) -> Iterator[tuple[_JointOn, _JointOn]]:
-    """The pairs with the other robot's axes in these senses."""
+    """Return the pairs with the other robot's axes in these senses."""
     given = iter(signs)
     for mine, their in pairs:
         yield mine, replace(their, axes=tuple(next(given) * axis for axis in their.axes))
 
 
 def _gain(hinge: str, pairs: Sequence[tuple[_JointOn, _JointOn]], length: float) -> float:
-    """How much farther than its joints miss a link may lie off along the axis of a hinge on it; infinite where its
-    joints do not tell that."""
+    """Return by how much more than its residual a link may be shifted along the axis of one of its revolute joints;
+    infinite if its joints do not determine that."""
     rows, asked = [], np.zeros(6)
     for mine, _ in pairs:
 
@@ -241,8 +242,8 @@ def _slide(joint: _JointOn) -> Array:
 def _fit_motion(
     points: Sequence[tuple[Array, Array]], axes: Sequence[tuple[Array, Array]], length: float, upright: Array | None
 ) -> tuple[Array, bool]:
-    """The rigid motion that brings the second of each pair nearest to the first (Kabsch); whether no other does. Axes
-    have the sense that they have after the turn ``upright``, or their own at first."""
+    """Return the rigid motion that brings the second of each pair nearest to the first (Kabsch), and True if it is
+    unique. Axes have their sense after the rotation ``upright``, or their own at first."""
     mine, theirs = (np.array([pair[k] for pair in points]) for k in (0, 1))
     H = (theirs - theirs.mean(axis=0)).T @ (mine - mine.mean(axis=0)) / length**2
     R = upright if upright is not None else _rotation(H + sum((np.outer(b, a) for a, b in axes), np.zeros((3, 3))))
@@ -259,7 +260,7 @@ def _rotation(H: Array) -> Array:
 
 
 def _miss(mine: Joint | _JointOn, their: Joint | _JointOn, X: Array, length: float) -> float:
-    """By how much a joint of the other robot, moved by X, is another one: axes as lines without sense."""
+    """Return the difference of a joint and another robot's joint moved by X: axes as lines without sense."""
     gap = mine.point - (X[:3, :3] @ their.point + X[:3, 3])
     axes = [X[:3, :3] @ axis for axis in their.axes]
     if mine.type in _ALONG:
@@ -271,7 +272,7 @@ def _miss(mine: Joint | _JointOn, their: Joint | _JointOn, X: Array, length: flo
 
 
 def _colours(robot: Mechanism, known: Mapping[str, int]) -> dict[str, int]:
-    """Joints coloured by what they are and what hangs on them, refined until no colour splits; ``known`` ones apart."""
+    """Return colours of joints by type and neighbours, refined until no colour splits; ``known`` ones are distinct."""
     colours: dict[str, int] = {name: hash((joint.type, known.get(name))) for name, joint in robot.joints.items()}
     ends = {link: hash((link == robot.base, link == robot.platform)) for link in robot.links}
     for _ in range(len(robot.links)):

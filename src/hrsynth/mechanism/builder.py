@@ -1,4 +1,4 @@
-"""A short way to write mechanisms down in Python: points and axes at the zero configuration, in the base frame."""
+"""Builder of mechanisms in Python: points and axes at the zero configuration, in the base frame."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from .observations.direction import Direction
 
 
 class Builder:
-    """Collects links and joints, then builds the frozen mechanism. The first link is the base, its frame the world.
+    """Collector of links and joints that builds the frozen mechanism. The first link is the base, its frame the
+    world's.
 
     >>> b = Builder("pendulum"); b.link("base"); b.link("bob", at=(0, 0, -1))
     >>> b.joint("hinge", "R", "base", "bob", at=(0, 0, 0), axis=(0, 1, 0), motor=True)
@@ -27,7 +28,7 @@ class Builder:
         self._couplings: list[Coupling] = []
 
     def link(self, name: str, at: ArrayLike = (0, 0, 0), rotation: ArrayLike | None = None) -> None:
-        """A link whose frame's origin lies at ``at``, with the axes ``rotation`` (3, 3), at the zero configuration."""
+        """Add a link whose frame's origin is ``at``, with the axes ``rotation`` (3, 3), at the zero configuration."""
         self._links.append(Link(name, pose(at, rotation)))
 
     def joint(
@@ -43,8 +44,8 @@ class Builder:
         motor: bool | str = False,
         loop: bool = False,
     ) -> None:
-        """A joint of type R, P, U, S, C, E (planar) or F with its centre ``at``; ``motor`` names its transmission
-        (True: ``motor_NAME``); ``loop`` says that a file writes it as a loop instead of a tree joint."""
+        """Add a joint of type R, P, U, S, C, E (planar) or F with its centre ``at``; ``motor`` names its transmission
+        (True: ``motor_NAME``); ``loop``: a file writes it as a loop instead of a tree joint."""
         axes = tuple(np.asarray(a, dtype=float) for a in (axis, axis2) if a is not None)
         named = Motor(f"motor_{name}" if motor is True else str(motor)) if motor else None
         self._joints.append(
@@ -61,16 +62,16 @@ class Builder:
         )
 
     def observe(self, leg: str, link: str, direction: ArrayLike) -> None:
-        """An observed segment: ``direction`` in the base frame at the zero configuration."""
+        """Add an observed segment: ``direction`` in the base frame at the zero configuration."""
         frame = next(each for each in self._links if each.name == link).pose
         self._observations.append(Direction(leg, link, frame[:3, :3].T @ np.asarray(direction, dtype=float)))
 
     def coupling(self, name: str, predecessor: str, successor: str, ratio: float) -> None:
-        """A gear between the coordinates of the two joints that carry these links."""
+        """Add a coupling between the coordinates of the two joints that carry these links."""
         self._couplings.append(Coupling(name, predecessor, successor, ratio))
 
     def build(self, platform: str) -> Mechanism:
-        """The frozen mechanism; the first link is the base."""
+        """Return the frozen mechanism; the first link is the base."""
         return Mechanism.of(
             self.name,
             self._links,

@@ -1,7 +1,7 @@
-"""Cameras, and what they see of a link: observations that are functions of a point B and an axis d fixed in the link,
-both in the frame of a camera with its centre C on the reference link (docs/pages/observations.md).
+"""Cameras and their observations of a link: functions of a point B and an axis d fixed in the link, both in the frame
+of a camera with its centre C on the reference link (docs/pages/observations.md).
 
-A kind gives its value and partial derivatives, the wrenches that remain when it is held, and its virtual chain.
+A kind gives its value and partial derivatives, the wrenches of its locked value, and its virtual chain.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ RING = 48
 
 @dataclass(frozen=True, eq=False, repr=False)
 class NamedCamera(Value):
-    """A named camera on a link: its frame's ``pose`` (4, 4) in the link's (x right, y down, z ahead, its origin the
-    centre C); the focal length and the size of its pictures, in pixels, where they are known."""
+    """Named camera on a link: its frame's ``pose`` (4, 4) in the link's (x right, y down, z ahead, its origin the
+    centre C); the focal length and the image size, in pixels, if known."""
 
     name: str
     link: str
@@ -42,18 +42,18 @@ class NamedCamera(Value):
         object.__setattr__(self, "pose", frozen(self.pose))
 
     def carried_by(self, into: Mapping[str, str], poses: Mapping[str, Array]) -> NamedCamera:
-        """The same camera where links became parts of others, as for observations."""
+        """Return the camera where links became parts of others, as for observations."""
         return replace(self, link=into[self.link], pose=relative_pose(self.link, into, poses) @ self.pose)
 
 
 def relative_pose(link: str, into: Mapping[str, str], poses: Mapping[str, Array]) -> Array:
-    """The pose of a link in the frame of the one that took it in."""
+    """Return the pose of a link in the frame of the one that took it in."""
     return AT_CENTRE if into[link] == link else inverse(poses[into[link]]) @ poses[link]
 
 
 @dataclass(frozen=True, eq=False)
 class VirtualJoint:
-    """A joint of a virtual chain, at the zero configuration in base axes: its type's letter, centre, axes."""
+    """Joint of a virtual chain, at the zero configuration in base axes: its type's letter, centre, axes."""
 
     letter: str
     at: Array
@@ -63,8 +63,8 @@ class VirtualJoint:
 
 @dataclass(frozen=True, eq=False)
 class ViewGeometry:
-    """Where camera and link are, in one frame: the centre C, the camera's z axis, the point B, the axis d; to build a
-    chain also ``far``, a unit vector far from all values of what its first U turns."""
+    """Geometry of camera and link, in one frame: the centre C, the camera's z axis, the point B, the axis d; to build a
+    chain also ``far``, a unit vector far from all directions that its first U rotates."""
 
     C: Numbers
     z: Numbers
@@ -74,22 +74,23 @@ class ViewGeometry:
 
     @property
     def ray(self) -> Array:
-        """The unit vector from C to B."""
+        """Unit vector from C to B."""
         return unit(self.B - self.C)
 
     @property
     def foot(self) -> Array:
-        """The point of the line (B, d) that is nearest to C."""
+        """Point of the line (B, d) that is nearest to C."""
         return np.asarray(self.B - ((self.B - self.C) @ self.d) * self.d)
 
 
 @dataclass(frozen=True, eq=False)
 class FixedValueLocus:
-    """What a held value leaves of a point of the link at ``place`` (3,), or with ``turns`` of a direction of it.
+    """Locus that a fixed value leaves to a point of the link at ``place`` (3,), or with ``turns`` to a direction of it.
 
-    A point stays in the planes ``through`` (3,) with these ``normals`` (k, 3) and, where ``radius`` is given, on the
+    A point stays in the planes ``through`` (3,) with these ``normals`` (k, 3) and, if ``radius`` is given, on the
     sphere about ``through``; a direction keeps its angles with the normals. All in the frame of the
-    :class:`ViewGeometry`."""
+    :class:`ViewGeometry`.
+    """
 
     place: Array
     normals: Array
@@ -99,29 +100,30 @@ class FixedValueLocus:
 
 
 def kept_in(place: Array, through: Array, *across: Array) -> FixedValueLocus:
-    """A point in planes with these normals, of any length: three hold it, two leave it a line."""
+    """Return the locus of a point in planes with these normals, of any length: three fix it, two leave it a line."""
     return FixedValueLocus(place, np.array([unit(n) for n in across]), through)
 
 
 def turned_across(d: Array, *across: Array) -> FixedValueLocus:
-    """A direction that keeps its angles with these vectors, of any length."""
+    """Return the locus of a direction that keeps its angles with these vectors, of any length."""
     return FixedValueLocus(d, np.array([unit(n) for n in across]), np.zeros(3), turns=True)
 
 
 def in_plane(at: ViewGeometry, n: Array) -> tuple[FixedValueLocus, ...]:
-    """The line (B, d) in the plane with this normal."""
+    """Return the loci of the line (B, d) in the plane with this normal."""
     return kept_in(at.B, at.B, n), turned_across(at.d, n)
 
 
 def gimbal(at: Array, turned: Array, far: Array | None, actuated: bool = False) -> VirtualJoint:
-    """A U at a point that turns a direction any way: its first axis e₁ far from it, its second normal to both."""
+    """Return a U at a point that rotates a direction any way: its first axis e₁ far from it, its second normal to
+    both."""
     first = perpendicular(turned) if far is None else far
     return VirtualJoint("U", at, (first, unit(np.cross(first, turned))), actuated)
 
 
 def across(at: ViewGeometry, normal: Array, out: Array, actuated: int) -> tuple[VirtualJoint, ...]:
-    """U-R-P-C to the line (B, d): U at C turns the ``normal`` of a plane through C, R turns in it, P goes along ``out``
-    in it, C lies along the line; the first so many of them actuated."""
+    """Return U-R-P-C to the line (B, d): U at C rotates the ``normal`` of a plane through C, R rotates in it, P
+    translates along ``out`` in it, C lies along the line; the first so many of them actuated."""
     joints = (
         gimbal(at.C, normal, at.far),
         VirtualJoint("R", at.C, (normal,)),
@@ -132,19 +134,19 @@ def across(at: ViewGeometry, normal: Array, out: Array, actuated: int) -> tuple[
 
 
 def stretch(p: Array, d: Array, size: float) -> Array:
-    """The piece (2, 3) of a line about p."""
+    """Return a segment (2, 3) of a line about p."""
     return np.array([p - size * d, p + size * d])
 
 
 def ring(p: Array, d: Array, r: float) -> Array:
-    """A circle as a polyline (n, 3)."""
+    """Return a circle as a polyline (n, 3)."""
     one = perpendicular(d)
     turns = np.linspace(0, 2 * np.pi, RING + 1)
     return np.asarray(p + abs(r) * (np.outer(np.cos(turns), one) + np.outer(np.sin(turns), np.cross(d, one))))
 
 
 def before_camera(points: Array) -> Array:
-    """The piece of a polyline (n, 3) that is in front of the camera; of a segment that part, else whole or nothing."""
+    """Return the part of a polyline (n, 3) in front of the camera; of a segment that part, else all or nothing."""
     ahead = points[:, 2] > NEAREST_SEEN
     if len(points) == 2 and ahead.sum() == 1:
         a, b = points[ahead][0], points[~ahead][0]
@@ -153,50 +155,51 @@ def before_camera(points: Array) -> Array:
 
 
 def depth_plane(z: Numbers) -> Array:
-    """g of the planes (…, 3) parallel to the picture at depths z (…, 1)."""
+    """Return g of the planes (…, 3) parallel to the image plane at depths z (…, 1)."""
     return np.asarray(np.eye(3)[2] / z)
 
 
 def line_plane(p: Array, d: Array) -> Array:
-    """g of the plane through a line (p, d) that is normal to that of C and the line: f/‖f‖², f the foot of C."""
+    """Return g of the plane through a line (p, d) that is normal to that of C and the line: f/‖f‖², f the point of the
+    line nearest to C."""
     foot = p - dot(p, d)[..., None] * d
     return np.asarray(foot / dot(foot, foot)[..., None])
 
 
 def on_plane(n: Array, g: Array) -> Array:
-    """The point nearest to C of the line in which the plane of normal n through C meets that of g."""
+    """Return the point nearest to C of the line in which the plane of normal n through C meets that of g."""
     inside = g - dot(g, n)[..., None] * n
     return np.asarray(inside / dot(inside, inside)[..., None])
 
 
 def apart(at: ViewGeometry, from_: Array, least: float, what: str, limit: str) -> float:
-    """The distance of C from a point; raises ``BadMechanism`` where it is not larger than ``least``."""
+    """Return the distance of C from a point. Raises ``BadMechanism`` if it is not larger than ``least``."""
     distance = float(np.linalg.norm(from_ - at.C))
     if not distance > least + SAME_POINT * (1 + least):
-        raise BadMechanism(f"{what}: distance from the camera's centre (m)", distance, limit)
+        raise BadMechanism(f"{what}: distance from the camera centre (m)", distance, limit)
     return distance
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CameraObservation(Observation):
-    """A measurement by a camera, of the point ``at`` (3,) and the ``axis`` (3,) in the *link's* frame; C is the origin
-    of the reference link's frame where no ``camera`` is named.
+    """Measurement by a camera, of the point ``at`` (3,) and the ``axis`` (3,) in the *link's* frame; C is the origin of
+    the reference link's frame if no ``camera`` is named.
 
-    Values are in the camera's frame. ``radius`` is that of a cylinder or circle (m), its sign says which edge is meant.
+    Values are in the camera's frame. ``radius`` is that of a cylinder or circle (m); its sign selects an edge.
     """
 
     locked: ClassVar[str]
-    """The wrenches that it transmits when it is held, for the table of all kinds."""
+    """Wrenches that it transmits when its value is fixed, for the table of all kinds."""
     rational: ClassVar[bool] = True
-    """Whether its wrenches are polynomials of C, B, d and z."""
+    """Its wrenches are polynomials of C, B, d and z."""
     whole: ClassVar[bool] = True
-    """Whether its rates vanish for just those motions against which its wrenches do no work, wherever it has one."""
+    """Its rates vanish exactly for the motions against which its wrenches do no work, if it has a rate."""
     along_z: ClassVar[bool] = False
-    """Whether the camera's z axis matters."""
+    """The camera's z axis matters."""
     signed: ClassVar[bool] = False
-    """Whether the sign of the radius says which of two is meant."""
+    """The sign of the radius selects one of two edges."""
     images_point: ClassVar[bool] = True
-    """Whether B itself is in the image, and not any point of a line."""
+    """B itself is in the image, not any point of a line."""
 
     at: Array = field(default_factory=lambda: frozen(np.zeros(3)), kw_only=True)
     axis: Array | None = field(default=None, kw_only=True)
@@ -219,63 +222,64 @@ class CameraObservation(Observation):
 
     @property
     def view(self) -> Array:
-        """The camera's pose (4, 4) in the reference link's frame."""
+        """Pose of the camera (4, 4) in the reference link's frame."""
         return AT_CENTRE if self.camera is None else self.camera.pose
 
     @staticmethod
     def measurement(p: Array, d: Array, r: Array) -> Array:
-        """The value (…, size) for points p (…, 3) and axes d (…, 3) in the camera's frame, radii r (…, 1)."""
+        """Return the value (…, size) for points p (…, 3) and axes d (…, 3) in the camera's frame, radii r (…, 1)."""
         raise NotImplementedError
 
     @staticmethod
     def partials(p: Array, d: Array, r: Array) -> tuple[Array | None, Array | None]:
-        """∂value/∂p and ∂value/∂d, (…, size, 3) each, None where it is zero."""
+        """Return ∂value/∂p and ∂value/∂d, (…, size, 3) each, None if zero."""
         raise NotImplementedError
 
     @staticmethod
     def plane(p: Array, d: Array, r: Array) -> Array | None:
-        """g (…, 3) of a plane g · x = 1 in the camera's frame in which what is seen lies: all that an image does not
-        tell of its depth. None where the value tells it."""
+        """Return g (…, 3) of a plane g · x = 1 in the camera's frame that contains the observed geometry: its depth,
+        which an image does not give. None if the value gives it."""
         return None
 
     @staticmethod
     def suppose_plane(p: Array, d: Array, r: Array, g: Array) -> tuple[Array, Array]:
-        """The p and d of the same value that a controller takes for true which supposes the plane g."""
+        """Return the p and d of the same value that a controller assumes with the plane g."""
         return p, d
 
     @staticmethod
     def error_jets(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
-        """:meth:`error` by formula, with its derivatives, of the coordinates of p and d in the camera's frame."""
+        """Return :meth:`error` by formula, with its derivatives by the coordinates of p and d in the camera's frame."""
         raise NotImplementedError
 
     def wrenches(self, at: ViewGeometry) -> list[Numbers]:
-        """The wrenches transmitted when the value is held, on the link's twist relative to the reference link."""
+        """Return the wrenches transmitted when the value is fixed, on the link's twist relative to the reference
+        link."""
         raise NotImplementedError
 
     def chain(self, at: ViewGeometry) -> tuple[VirtualJoint, ...]:
-        """The virtual chain from the reference link to the link; raises ``BadMechanism`` where the value has no rate
-        (a point in the camera's centre)."""
+        """Return the virtual chain from the reference link to the link. Raises ``BadMechanism`` if the value has no
+        rate (a point in the camera centre)."""
         raise NotImplementedError
 
     def loci(self, at: ViewGeometry) -> tuple[FixedValueLocus, ...]:
-        """What the link's points and directions can do while the value keeps but for the sense of lines, planes and
-        axes; none where that is none of these."""
+        """Return the loci of the link's points and directions with a fixed value (but for the sense of lines, planes
+        and axes); none if they have another form."""
         return ()
 
     def pointing(self, values: Array) -> Array | None:
-        """Of values (n, size), what the chain's first U turns (n, 3), in the camera's frame; None where that is not
-        among them."""
+        """Return the part (n, 3) of values (n, size) that the chain's first U rotates, in the camera's frame; None if
+        it is not among them."""
         return values[:, :3]
 
     @staticmethod
     def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
-        """How it is drawn in the camera's frame, of the point p (3,), the axis d (3,) and the radius r: by default the
-        ray."""
+        """Return the drawing in the camera's frame, for the point p (3,), the axis d (3,) and the radius r: by default
+        the ray."""
         return Drawn((np.array([0 * p, p]),))
 
     @staticmethod
     def polylines(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
-        """What a picture shows, as polylines (n, 3) in the camera's frame: by default the point."""
+        """Return the image as polylines (n, 3) in the camera's frame: by default the point."""
         return (p[None],)
 
     def draw(self, X_reference: Array, X_link: Array, size: float) -> Drawn:
@@ -289,13 +293,13 @@ class CameraObservation(Observation):
         return [each[:, :2] / each[:, 2:] for each in map(before_camera, every) if len(each)]
 
     def _place(self, X_camera: Array, X_link: Array) -> tuple[Array, Array, float]:
-        """p and d in the camera's frame, and r."""
+        """Return p and d in the camera's frame, and r."""
         X = inverse(X_camera) @ X_link
         axis = np.zeros(3) if self.axis is None else X[:3, :3] @ self.axis
         return transform(X, self.at), axis, self.radius or 0.0
 
     def ahead(self, X_reference: Array, X_link: Array) -> float:
-        """The sine of the angle by which the ray to B is in front of the focal plane; where the size of the picture is
+        """Return the sine of the angle by which the ray to B is in front of the focal plane; if the image size is
         known, the least of the sines by which it is inside of its four sides."""
         p = transform(inverse(X_reference @ self.view), transform(X_link, self.at))
         camera, sides = self.camera, [np.array([0.0, 0.0, 1.0])]
@@ -305,13 +309,13 @@ class CameraObservation(Observation):
         return float(np.min(np.array(sides) @ p) / max(float(np.linalg.norm(p)), SAME_POINT))
 
     def plane_at(self, X_reference: Array, X_link: Array) -> Array | None:
-        """:meth:`plane` where camera and link are, (3,)."""
+        """Return :meth:`plane` at these poses of camera and link, (3,)."""
         X = inverse(X_reference @ self.view) @ X_link
         d = X[:3, :3] @ self.axis if self.axis is not None else np.zeros(3)
         return self.plane(transform(X, self.at), d, np.array([self.radius or 0.0]))
 
     def pixels(self, noise: Mapping[str, float]) -> float:
-        """Noise of so many pixels in the picture's plane z = 1."""
+        """Return noise in pixels in the image plane z = 1."""
         focal = None if self.camera is None else self.camera.focal
         assert focal is not None
         return noise["px"] / focal
@@ -319,21 +323,22 @@ class CameraObservation(Observation):
     def suppose_plane_rate(
         self, plane: Array, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array
     ) -> Array:
-        """The rate (size, n) of the value if what is seen lay in the ``plane`` (3,), and moved as the link does."""
+        """Return the rate (size, n) of the value if the observed geometry was in the ``plane`` (3,) and moved like the
+        link."""
         return self._together((self,), X_reference, X_link[None], V_reference, V_link[None], plane[None])[1]
 
     def sighting(self, X_reference: Array, X_link: Array, far: Array | None = None) -> ViewGeometry:
-        """Where camera and link are, in the base frame."""
+        """Return the geometry of camera and link in the base frame."""
         X = X_reference @ self.view
         axis = X_link[:3, :3] @ self.axis if self.axis is not None else np.zeros(3)
         return ViewGeometry(X[:3, 3], X[:3, 2], transform(X_link, self.at), axis, far)
 
     def value(self, X_reference: Array, X_link: Array) -> Array:
-        """The value, shape (size,), in the camera's frame (m)."""
+        """Return the value, shape (size,), in the camera's frame (m)."""
         return self.together((self,), X_reference, X_link[None], np.zeros((6, 0)), np.zeros((1, 6, 0)))[0]
 
     def rate(self, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array) -> Array:
-        """∂p · (velocity of B as the link carries it − as the camera would) + ∂d · ((ω − ω_c) × d), (size, n)."""
+        """Return ∂p · (velocity of B on the link − on the camera's link) + ∂d · ((ω − ω_c) × d), (size, n)."""
         return self.together((self,), X_reference, X_link[None], V_reference, V_link[None])[1]
 
     @classmethod
@@ -352,7 +357,7 @@ class CameraObservation(Observation):
         V_links: Array,
         planes: Array | None = None,
     ) -> tuple[Array, Array]:
-        """The same, where ``planes`` (k, 3) are given of what is supposed to lie in them."""
+        """Return values and rates, with ``planes`` (k, 3) that are assumed to contain the observed geometry."""
         at, axes, radii, views = _stack_observations(tuple(observations))
         X = X_reference @ views
         seen = X[:, :3, :3].transpose(0, 2, 1)
@@ -408,7 +413,7 @@ class CameraObservation(Observation):
 
 
 class MetricPoint(CameraObservation):
-    """What a sensor tells of a point in metres."""
+    """Measurement of a point in metres."""
 
     needs = ("at",)
     dimension = 1
@@ -420,7 +425,7 @@ class MetricPoint(CameraObservation):
 
 @lru_cache(maxsize=512)
 def _stack_observations(observations: tuple[Observation, ...]) -> tuple[Array, Array, Array, Array]:
-    """Points (k, 3, 1) and axes (k, 3, 1) of observations in their links, radii (k, 1), cameras (k, 4, 4)."""
+    """Return points (k, 3, 1) and axes (k, 3, 1) of observations in their links, radii (k, 1), cameras (k, 4, 4)."""
     sights = [o for o in observations if isinstance(o, CameraObservation)]
     axes = [o.axis if o.axis is not None else np.zeros(3) for o in sights]
     return (
@@ -432,12 +437,12 @@ def _stack_observations(observations: tuple[Observation, ...]) -> tuple[Array, A
 
 
 def normalise_rates(w: Array) -> tuple[Array, Array]:
-    """w/‖w‖ (…, 3) of vectors w, and what its rate makes of ẇ: (I − n nᵀ)/‖w‖, (…, 3, 3). Raises ``UndefinedValue``
-    where a w vanishes."""
+    """Return w/‖w‖ (…, 3) of vectors w, and the factor of its rate on ẇ: (I − n nᵀ)/‖w‖, (…, 3, 3). Raises
+    ``UndefinedValue`` if a w vanishes."""
     size = np.linalg.norm(w, axis=-1, keepdims=True)
     if not np.all(size > SAME_POINT):
         raise UndefinedValue(
-            "a point or line in the image: distance from the camera's centre (m)",
+            "a point or line in the image: distance from the camera centre (m)",
             float(size.min()),
             f"more than {SAME_POINT:g}",
         )

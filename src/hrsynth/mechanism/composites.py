@@ -1,7 +1,7 @@
-"""Composite joints, recognised by geometry and never declared: planar parallelograms, equal parallel rods, sliders.
+"""Composite joints, recognised by geometry and never declared: planar parallelograms, equal parallel rods, carriers.
 
-The joint graph is contracted step by step: every edge carries the word of what it stands for, and the joints and links
-inside it, until nothing contracts any more.
+The joint graph is contracted step by step: every edge carries its architecture notation and the joints and links inside
+it, until nothing contracts any more.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .notation import Bar, Carrier, Letter, Rods, Word
 
 @dataclass(frozen=True)
 class WordEdge:
-    """What stands between two links: ``word`` read from ``tail`` to ``head``, the joints and the links inside."""
+    """Edge between two links: ``word`` read from ``tail`` to ``head``, the joints and the links inside."""
 
     tail: str
     head: str
@@ -32,17 +32,17 @@ class WordEdge:
     inside: tuple[str, ...] = ()
 
     def word_from(self, link: str) -> Word:
-        """The word read from ``link`` to the other end."""
+        """Return the word read from ``link`` to the other end."""
         return self.word if link == self.tail else self.word.reversed()
 
     def other(self, link: str) -> str:
-        """The other end."""
+        """Return the other end."""
         return self.head if link == self.tail else self.tail
 
 
 @dataclass(frozen=True)
 class BinaryLink:
-    """A link with a ball (or universal) joint at each end, from ``near`` to ``far`` (joint names)."""
+    """Link with a spherical (or universal) joint at each end, from ``near`` to ``far`` (joint names)."""
 
     link: str
     near: str
@@ -50,7 +50,7 @@ class BinaryLink:
 
 
 class WordGraph:
-    """The contracted joint graph of a mechanism; ``kept`` links never disappear into an edge."""
+    """Contracted joint graph of a mechanism; ``kept`` links never disappear into an edge."""
 
     def __init__(self, mechanism: Mechanism, kept: Collection[str], links: Iterable[str] | None = None) -> None:
         self.mechanism = mechanism
@@ -81,28 +81,28 @@ class WordGraph:
             del self._at[link]
 
     def __len__(self) -> int:
-        """The number of links that are left."""
+        """Return the number of links that are left."""
         return len(self._at)
 
     def edges_at(self, link: str) -> list[tuple[int, WordEdge]]:
-        """Keys and edges at a link, oldest first."""
+        """Return keys and edges at a link, oldest first."""
         return list(self._at[link].items())
 
     def edges(self) -> list[WordEdge]:
-        """All edges, oldest first."""
+        """Return all edges, oldest first."""
         table = {key: edge for edges in self._at.values() for key, edge in edges.items()}
         return [table[key] for key in sorted(table)]
 
     def between(self, a: str, b: str) -> list[tuple[int, WordEdge]]:
-        """Keys and edges between two links."""
+        """Return keys and edges between two links."""
         return [(key, edge) for key, edge in self.edges_at(a) if edge.other(a) == b] if a in self._at else []
 
     def adjacency(self) -> graphs.Adjacency:
-        """The links that are left, each with those an edge joins it to."""
+        """Return the links that are left, each with its neighbours."""
         return graphs.adjacency(self._at, ((edge.tail, edge.head) for edge in self.edges()))
 
     def keep(self, joints: Collection[str]) -> None:
-        """Remove the edges that stand for other joints than these."""
+        """Remove the edges of other joints than these."""
         for edges in self._at.values():
             for key in [key for key, edge in edges.items() if not set(edge.joints) <= set(joints)]:
                 del edges[key]
@@ -116,7 +116,7 @@ class WordGraph:
         return self
 
     def recognise_carriers(self) -> WordGraph:
-        """Contract carriers as well: links held by sliders at the end of a chain."""
+        """Contract carriers as well: links guided by P joints at the end of a chain."""
         probe = WordGraph(self.mechanism, self.kept, self._links)
         while probe.recognise() and (probe._series() or probe._carrier()):
             pass
@@ -129,7 +129,7 @@ class WordGraph:
         return self
 
     def reduce(self) -> WordGraph:
-        """Contract everything that stands in series or in parallel as well."""
+        """Contract everything in series or in parallel as well."""
         while True:
             self.recognise()
             if not (self._series() or self._carrier() or self._parallel()):
@@ -143,7 +143,8 @@ class WordGraph:
                     yield link, edges[0][1], edges[1][1]
 
     def _groups(self, letters: set[str]) -> Iterator[tuple[str, str, list[BinaryLink]]]:
-        """Binary links whose two joints are single joints of the given types, grouped by the pair they join."""
+        """Yield binary links whose two joints are single joints of the given types, grouped by the pair that they
+        connect."""
         table: dict[frozenset[str], list[tuple[str, WordEdge, WordEdge]]] = {}
         for link, first, second in self._binary():
             if all(
@@ -223,7 +224,7 @@ class WordGraph:
                     yield WordEdge(tail, head, Word((Letter("Pi", motor),)), names, tuple(links)), links
 
     def _series(self) -> bool:
-        """All links in series: what is contracted has several joints, so no rod or crank is made or lost by it."""
+        """Contract all links in series: contracted edges have several joints, so no rod or crank is made or lost."""
         found = False
         for link, first, second in self._binary():
             self._remove_links((link,))
@@ -264,7 +265,8 @@ class WordGraph:
         return False
 
     def _carrier(self) -> bool:
-        """{chain-sliders}: a link held by P joints from another, and carried by the end of a chain from it."""
+        """Contract {chain-sliders}: a link guided by P joints from another, and carried by the end of a chain from
+        it."""
         for link in self.mechanism.links:
             if link not in self._at or link in self.kept:
                 continue

@@ -1,7 +1,7 @@
 """Small undirected graphs: what a few dozen links need, without the import of a graph library.
 
-A graph is its adjacency: node to the nodes next to it. The order of both is kept, so that every answer is the same
-from run to run. ``within`` restricts a question to some of the nodes.
+A graph is its adjacency: node to the nodes next to it. The order of both is kept, so that every result is the same
+in every run. ``within`` restricts a search to some of the nodes.
 """
 
 from __future__ import annotations
@@ -44,12 +44,12 @@ def distances(graph: Adjacency, start: str, within: Container[str] | None = None
 
 
 def component(graph: Adjacency, start: str, within: Container[str] | None = None) -> set[str]:
-    """The nodes that can be reached from ``start``, itself included."""
+    """Return the nodes that can be reached from ``start``, itself included."""
     return set(distances(graph, start, within))
 
 
 def components(graph: Adjacency, within: Container[str] | None = None) -> Iterator[set[str]]:
-    """The connected parts, in the order of their first nodes."""
+    """Return the connected parts, in the order of their first nodes."""
     seen: set[str] = set()
     for node in graph:
         if node not in seen and (within is None or node in within):
@@ -59,14 +59,14 @@ def components(graph: Adjacency, within: Container[str] | None = None) -> Iterat
 
 
 def is_bridge(pairs: Sequence[tuple[str, str]], place: int) -> bool:
-    """Whether nothing else joins the two ends of the edge at this place among all edges."""
+    """Return True if nothing else connects the two ends of the edge at this index among all edges."""
     one, other = pairs[place]
     rest = adjacency((one,), (pair for k, pair in enumerate(pairs) if k != place))
     return other not in component(rest, one)
 
 
 def paths(graph: Adjacency, start: str, end: str, within: Container[str] | None = None) -> Iterator[list[str]]:
-    """All ways from ``start`` to ``end`` that visit no node twice, depth first."""
+    """Yield all paths from ``start`` to ``end`` that visit no node twice, depth first."""
     way, ahead = [start], [iter(graph[start])]
     while ahead:
         node = next(ahead[-1], None)
@@ -81,7 +81,7 @@ def paths(graph: Adjacency, start: str, end: str, within: Container[str] | None 
 
 
 def shortest_path(graph: Adjacency, start: str, end: str) -> list[str]:
-    """A way from ``start`` to ``end`` with the fewest edges; raises ``KeyError`` where there is none."""
+    """Return a path from ``start`` to ``end`` with the fewest edges. Raises ``KeyError`` if there is none."""
     left = distances(graph, end)
     way = [start]
     for remaining in range(left[start] - 1, -1, -1):
@@ -90,8 +90,8 @@ def shortest_path(graph: Adjacency, start: str, end: str) -> list[str]:
 
 
 def spanning_forest(nodes: Iterable[str], bonds: Sequence[B], weights: Sequence[float]) -> list[B]:
-    """The bonds of a minimum spanning forest, lightest first (Kruskal); of equal ones that of the earlier node, then of
-    the pair that is joined first."""
+    """Return the bonds of a minimum spanning forest, lightest first (Kruskal); among equals that of the earlier node,
+    then of the pair that is connected first."""
     place = {node: i for i, node in enumerate(nodes)}
     ends = [sorted((place[one], place[other])) for one, other in (bond.links for bond in bonds)]
     pairs: dict[tuple[int, int], int] = {}
@@ -113,7 +113,7 @@ def _root(tree: dict[str, str], node: str) -> str:
 
 
 def outward(root: str, bonds: Iterable[B]) -> list[tuple[B, str, str]]:
-    """The bonds of a tree breadth first from ``root``: each with its near and its far link."""
+    """Return the bonds of a tree breadth first from ``root``: each with its near and its far link."""
     table: dict[str, list[B]] = {}
     for bond in bonds:
         for link in bond.links:

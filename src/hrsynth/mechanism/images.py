@@ -1,8 +1,8 @@
-"""What a servo loop feeds back of an image, as the field writes it: coordinates x = X/Z, y = Y/Z of points, ρ and θ of
-lines, centre and second moments of ellipses (Chaumette and Hutchinson, *Visual servo control I*, 2006; Espiau,
-Chaumette and Rives, 1992), each with its derivative by what is measured; and what noise makes of an image.
+"""Image features of a servo loop: coordinates x = X/Z, y = Y/Z of points, ρ and θ of lines, centre and second moments
+of ellipses (Chaumette and Hutchinson, *Visual servo control I*, 2006; Espiau, Chaumette and Rives, 1992), each with its
+derivative by the measured value; and noise of images.
 
-The picture's plane is z = 1 of the camera's frame; noise is in units of it, or in radians.
+The image plane is z = 1 of the camera's frame; noise is in units of it, or in radians.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from .cameras import CameraObservation, FixedValueLocus, ViewGeometry, in_plane,
 from .observation import Drawn
 
 HALF_PICTURE = 1.0
-"""A line in the image is found by two points this far on each side of the one nearest to the picture's centre: at the
-edges of a picture of 90°."""
+"""Distance of the two points that define a line in the image, on each side of the one nearest to the image centre: at
+the edges of an image of 90°."""
 TURNS = 2 * np.pi * np.arange(5) / 5
-"""Where on an ellipse the five points are from which its conic is found."""
+"""Angles of the five points on an ellipse that define its conic."""
 
 
 def point_image(u: Array) -> Array:
-    """x = X/Z, y = Y/Z of rays u (…, 3)."""
+    """Return x = X/Z, y = Y/Z of rays u (…, 3)."""
     return np.asarray(u[..., :2] / u[..., 2:])
 
 
 def point_slope(u: Array) -> Array:
-    """∂(x, y)/∂u, (…, 2, 3)."""
+    """Return ∂(x, y)/∂u, (…, 2, 3)."""
     slope = np.zeros((*u.shape[:-1], 2, 3))
     slope[..., 0, 0] = slope[..., 1, 1] = 1 / u[..., 2]
     slope[..., 2] = -u[..., :2] / u[..., 2:] ** 2
@@ -40,12 +40,12 @@ def point_slope(u: Array) -> Array:
 
 
 def line_image(n: Array) -> Array:
-    """ρ, θ of the line x cos θ + y sin θ = ρ in the plane of normal n (…, 3) through C."""
+    """Return ρ, θ of the line x cos θ + y sin θ = ρ in the plane of normal n (…, 3) through C."""
     return np.stack([-n[..., 2] / np.hypot(n[..., 0], n[..., 1]), np.arctan2(n[..., 1], n[..., 0])], axis=-1)
 
 
 def line_slope(n: Array) -> Array:
-    """∂(ρ, θ)/∂n, (…, 2, 3)."""
+    """Return ∂(ρ, θ)/∂n, (…, 2, 3)."""
     size = np.hypot(n[..., 0], n[..., 1])
     slope = np.zeros((*n.shape[:-1], 2, 3))
     slope[..., 0, :2] = n[..., 2:] * n[..., :2] / size[..., None] ** 3
@@ -55,13 +55,13 @@ def line_slope(n: Array) -> Array:
 
 
 def line_apart(n: Array, wanted: Array) -> Array:
-    """The difference of ρ and θ, that of θ without whole turns."""
+    """Return the difference of ρ and θ, that of θ without full rotations."""
     found = line_image(n) - line_image(wanted)
     return np.array([found[0], wrap_angle(float(found[1]))])
 
 
 def line_fed(n: Sequence[Jet], wanted: Array) -> list[Jet]:
-    """The same with derivatives, n of any length."""
+    """Return the difference with derivatives, n of any length."""
     rho, theta = line_image(wanted).tolist()
     c, s = float(np.cos(theta)), float(np.sin(theta))
     size = (n[0] * n[0] + n[1] * n[1]).sqrt()
@@ -69,14 +69,14 @@ def line_fed(n: Sequence[Jet], wanted: Array) -> list[Jet]:
 
 
 def ellipse_image(Q: Array) -> Array:
-    """Centre x, y and moments n₂₀, n₁₁, n₀₂ of the ellipse (x, y, 1) Q (x, y, 1)ᵀ = 0, Q (…, 3, 3) symmetric: those
-    second moments over the area, a quarter of k A⁻¹ where (x − c)ᵀ A (x − c) = k."""
+    """Return centre x, y and moments n₂₀, n₁₁, n₀₂ of the ellipse (x, y, 1) Q (x, y, 1)ᵀ = 0, Q (…, 3, 3) symmetric:
+    second moments over the area, a quarter of k A⁻¹ for (x − c)ᵀ A (x − c) = k."""
     centre, spread, _, _ = _ellipse(Q)
     return np.concatenate([centre, spread[..., (0, 0, 1), (0, 1, 1)]], axis=-1)
 
 
 def ellipse_fed(Q: Sequence[Sequence[Jet]], wanted: Array) -> list[Jet]:
-    """Their difference from those of a wanted Q (3, 3), with derivatives."""
+    """Return their difference from those of a desired Q (3, 3), with derivatives."""
     (a, b, x), (_, c, y), (_, _, z) = Q
     size = a * c - b * b
     centre = [(b * y - c * x) / size, (b * x - a * y) / size]
@@ -86,7 +86,7 @@ def ellipse_fed(Q: Sequence[Sequence[Jet]], wanted: Array) -> list[Jet]:
 
 
 def ellipse_slope(Q: Array, along: Array) -> Array:
-    """Rates (…, 5) of the same where Q changes at the rate ``along`` (…, 3, 3)."""
+    """Return the rates (…, 5) of these where Q changes at the rate ``along`` (…, 3, 3)."""
     centre, _, inverse, k = _ellipse(Q)
     A, b = along[..., :2, :2], along[..., :2, 2]
     moved = np.einsum("...ij,...j->...i", A, centre)
@@ -97,7 +97,7 @@ def ellipse_slope(Q: Array, along: Array) -> Array:
 
 
 def _ellipse(Q: Array) -> tuple[Array, Array, Array, Array]:
-    """Centre (…, 2), moments (…, 2, 2), A⁻¹ and k."""
+    """Return centre (…, 2), moments (…, 2, 2), A⁻¹ and k."""
     inverse = np.asarray(np.linalg.inv(Q[..., :2, :2]), dtype=np.float64)
     b = Q[..., :2, 2]
     centre = np.asarray(-np.einsum("...ij,...j->...i", inverse, b))
@@ -106,18 +106,19 @@ def _ellipse(Q: Array) -> tuple[Array, Array, Array, Array]:
 
 
 def tilt_vector(u: Array, shock: Array, angle: float) -> Array:
-    """A unit vector (3,) inside a cone of half-angle ``angle`` about u; ``shock`` (3,) lies in the unit ball."""
+    """Return a unit vector (3,) inside a cone of half-angle ``angle`` about u; the noise sample ``shock`` (3,) lies in
+    the unit ball."""
     across = shock - (shock @ u) * u
     return unit(u + np.tan(angle) * across)
 
 
 def shifted_point(u: Array, shock: Array, by: float) -> Array:
-    """The ray (3,) of an image point that is found up to ``by`` beside its place."""
+    """Return the ray (3,) of an image point with an error of up to ``by``."""
     return unit([*(point_image(u) + by * shock[:2]), 1.0])
 
 
 def shifted_line(n: Array, shock: Array, by: float) -> Array:
-    """The normal (3,) of a line in the image of which two points are found up to ``by`` across it."""
+    """Return the normal (3,) of a line in the image through two points with errors of up to ``by`` across it."""
     across = unit(n[:2])
     nearest, along = -n[2] / np.hypot(*n[:2]) * across, np.array([-across[1], across[0]])
     one, other = (
@@ -129,7 +130,7 @@ def shifted_line(n: Array, shock: Array, by: float) -> Array:
 
 
 def shifted_ellipse(Q: Array, shocks: Array, by: float) -> Array:
-    """The conic (3, 3), of unknown size, through five points of an ellipse that are found up to ``by`` beside it;
+    """Return the conic (3, 3), of unknown size, through five points of an ellipse with errors of up to ``by``;
     ``shocks`` (2, 3)."""
     centre, spread, _, _ = _ellipse(Q)
     points = centre + 2 * np.column_stack([np.cos(TURNS), np.sin(TURNS)]) @ np.linalg.cholesky(spread).T
@@ -143,8 +144,8 @@ def shifted_ellipse(Q: Array, shocks: Array, by: float) -> Array:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SeenLine(CameraObservation):
-    """A measurement of which the value is the unit normal n of a plane through C that meets a straight line or a
-    cylinder: a line in the picture."""
+    """Measurement of the unit normal n of a plane through C that meets a straight line or a cylinder: a line in the
+    image."""
 
     size = 3
     angular = True
@@ -153,22 +154,22 @@ class SeenLine(CameraObservation):
     images_point = False
 
     def normal(self, at: ViewGeometry) -> Numbers:
-        """Of the plane, of any length."""
+        """Return the normal of the plane, of any length."""
         raise NotImplementedError
 
     @staticmethod
     def meet_plane(p: Array, d: Array, r: Array) -> Array:
-        """A point of the line of direction d in which the plane meets what is seen."""
+        """Return a point of the line of direction d in which the plane meets the observed geometry."""
         raise NotImplementedError
 
     @classmethod
     def plane(cls, p: Array, d: Array, r: Array) -> Array | None:
-        """Through that line, normal to the plane of C and it."""
+        """Return the plane through that line, normal to the plane of C and it."""
         return line_plane(cls.meet_plane(p, d, r), d)
 
     @classmethod
     def outline(cls, p: Array, d: Array, r: float, size: float) -> Drawn:
-        """A piece of that line, and its plane with C."""
+        """Return a segment of that line, and its plane with C."""
         piece = stretch(cls.meet_plane(p, d, np.array([r])), d, size)
         return Drawn((piece,), (np.vstack([0 * p, piece]),))
 
@@ -186,7 +187,7 @@ class SeenLine(CameraObservation):
         return line_slope(value)
 
     def sense(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
-        """Through two image points beside the line."""
+        """Return the line through two image points near it."""
         return shifted_line(value, shocks[0], self.pixels(noise))
 
     @classmethod

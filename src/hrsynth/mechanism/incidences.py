@@ -1,11 +1,11 @@
-"""The special relations of a mechanism's geometry that persist in motion: what its architecture prescribes.
+"""Incidences of a mechanism: special relations of its geometry that persist in motion, as its architecture prescribes.
 
-Instantaneous kinematics depends on joint centres, joint axes and observed directions alone. A relation between them is
-proposed if it holds at every configuration given (docs/pages/proofs.md, section 12); what holds by accident at one of
-them does not. Which of those proposed follow from the file is another question (:mod:`.carried`,
-:mod:`hrsynth.analysis.loop_invariants`). All relations are of two kinds, so that geometry can be drawn anew in linear
-steps: a direction is normal to earlier ones, or in the plane of two earlier ones; a sum of centres ±P_j is zero,
-parallel to a direction, or normal to one."""
+Instantaneous kinematics depends on joint centres, joint axes and observed directions alone. An incidence between them
+is proposed if it holds at every given configuration (docs/pages/proofs.md, section 12), not at one of them by accident.
+:mod:`.structural_incidences` and :mod:`hrsynth.analysis.loop_invariants` decide which of them follow from the file. All
+are of two kinds, so that geometry can be sampled in linear steps: a direction is normal to earlier ones, or in the
+plane of two earlier ones; a sum of centres ±P_j is zero, parallel to a direction, or normal to one.
+"""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ from .model import Joint, JointType, Mechanism
 from .observations.direction import SeenAxis
 
 AXIAL = (JointType.REVOLUTE, JointType.CYLINDRICAL)
-"""Joints whose centre may slide along their axis without consequence."""
+"""Joints whose centre may move along their axis without consequence."""
 CENTRED = (*AXIAL, JointType.UNIVERSAL, JointType.SPHERICAL)
 """Joints whose centre matters; that of a P or E may be anywhere."""
 
 
 @dataclass(frozen=True)
 class DirectionSource:
-    """Where an observed direction comes from: a ``class`` of directions; ``between`` two centres; the ``foot``: between
-    two centres, normal to a class; the common ``normal`` of two classes."""
+    """Source of an observed direction: a ``class`` of directions; ``between`` two centres; the ``foot``: between two
+    centres, normal to a class; the common ``normal`` of two classes."""
 
     kind: Literal["class", "between", "foot", "normal"]
     points: tuple[int, ...] = ()
@@ -44,38 +44,38 @@ class DirectionSource:
 
 @dataclass(frozen=True)
 class Incidences:
-    """Directions in classes of parallels, centres, and all that ties them."""
+    """Directions in classes of parallels, centres, and their incidences."""
 
     axes: Mapping[str, tuple[int, ...]]
-    """The class of each axis of each joint."""
+    """Class of each axis of each joint."""
     tower: tuple[tuple[tuple[int, ...], ...], ...]
-    """For each class what it obeys: normal to an earlier class (a,), in the plane of two earlier ones (a, b)."""
+    """Incidence of each class: normal to an earlier class (a,), in the plane of two earlier ones (a, b)."""
     centres: Mapping[str, int]
-    """The number of each joint's centre, where it has one that matters."""
+    """Number of each joint's centre, if it matters."""
     point: int | None
-    """The number of the platform's point, for a point body."""
+    """Number of the platform's point, for a point body."""
     count: int
     """Number of all centres: of joints, of points where axes meet, the platform's point."""
     incidences: tuple[Incidence, ...]
     sights: tuple[DirectionSource, ...]
-    """One for each observation."""
+    """Source of each observation's direction."""
     hosts: tuple[str, ...]
-    """The link in which each centre is fixed (that of a C: its predecessor)."""
+    """Link in which each centre is fixed (that of a C: its predecessor)."""
     fixed: tuple[tuple[str, ...], ...]
-    """For each class the link in which each of its directions is fixed, joint by joint, observed ones last."""
+    """Link in which each direction of each class is fixed, joint by joint, observed ones last."""
     watched: tuple[str, ...]
-    """The link of each observation."""
+    """Link of each observation."""
     directions: Array = field(compare=False)
-    """A direction of each class at each configuration (classes, configurations, 3)."""
+    """Direction of each class at each configuration (classes, configurations, 3)."""
     doubt: str = ""
-    """Why the relations are not to be relied on; empty where they are."""
+    """Reason why the incidences are not reliable; empty if they are."""
     held: float = 0.0
-    """The largest defect (sines, characteristic lengths) of a relation that counts as held."""
+    """Largest defect (sines, characteristic lengths) of an incidence that holds."""
     missed: float = float("inf")
-    """The smallest defect of one that does not, where it is at most ``RANK_GAP`` tolerances."""
+    """Smallest defect of one that does not, if it is at most ``RANK_GAP`` tolerances."""
 
     def members(self, number: int) -> str:
-        """The joints with an axis in a class, in words."""
+        """Return the joints with an axis in a class as a text."""
         joints = [name for name, classes in self.axes.items() if number in classes]
         return "axes of " + ", ".join(joints) if joints else "an observed direction"
 
@@ -87,7 +87,7 @@ def recognise(
     point: Array | None = None,
     points: Sequence[tuple[str, Sequence[float]]] = (),
 ) -> Incidences:
-    """The relations that hold at all configurations; ``poses`` are X_BL (configurations, 4, 4) of every link.
+    """Return the incidences that hold at all configurations; ``poses`` are X_BL (configurations, 4, 4) of every link.
 
     ``point`` is the platform's point in the platform's frame, for a point body; ``points`` are further ones, with their
     links, in whose frames they are: they are the last centres.
@@ -151,16 +151,16 @@ def recognise(
 
 
 def _doubt(sieve: Sieve) -> str:
-    """Why what a sieve kept is not to be relied on (docs/pages/proofs.md, section 12)."""
+    """Return the reason why the result is not reliable (docs/pages/proofs.md, section 12)."""
     if sieve.mixed is not None:
         return (
-            "the samples are of several operation modes: a relation of its geometry holds at zero and at "
+            "the samples are of several operation modes: an incidence of its geometry holds at zero and at "
             "{} of {} of them".format(*sieve.mixed)
         )
     if sieve.rejected < RANK_GAP * sieve.accepted:
         return (
-            f"its geometry is nearly special: a relation that counts as held misses by {sieve.accepted:.1e}, one "
-            f"that does not by {sieve.rejected:.1e}, needed: {RANK_GAP:.0e} times as much"
+            f"its geometry is nearly special: an incidence that holds has a defect of {sieve.accepted:.1e}, one "
+            f"that does not of {sieve.rejected:.1e}, needed: {RANK_GAP:.0e} times as much"
         )
     return ""
 
@@ -190,7 +190,7 @@ class _Drawing:
             self.add_point(mechanism.platform, point)
 
     def add_point(self, link: str, place: Array) -> None:
-        """A further point, in the frame of its link."""
+        """Add a further point, in the frame of its link."""
         self.points.append(self._at(link, transform(self.mechanism.links[link].pose, place)))
         self.hosts.append((link,))
         self.carriers.append(link)
@@ -207,7 +207,8 @@ class _Drawing:
             self.carriers.append(joint.predecessor)
 
     def _meetings(self) -> list[tuple[str, Array]]:
-        """Points (configurations, 3) at which the axes of three or more R or C meet, and the link of two of them."""
+        """Return points (configurations, 3) at which the axes of three or more R or C meet, and the link of two of
+        them."""
         mechanism, near = self.mechanism, SAME_POINT * self.mechanism.length
         turning = [joint for joint in mechanism.joints.values() if joint.type in AXIAL]
 
@@ -226,7 +227,7 @@ class _Drawing:
         return found
 
     def turned(self, observation: SeenAxis) -> Array:
-        """The observed direction in base axes (configurations, 3)."""
+        """Return the observed direction in base axes (configurations, 3)."""
         link = self.mechanism.links[observation.link]
         return np.asarray(self.turns[link.name] @ link.pose[:3, :3] @ observation.direction)
 
@@ -235,7 +236,7 @@ class _Drawing:
 
     @cached_property
     def sliding(self) -> list[set[str]]:
-        """The sets of links that only slide along each other."""
+        """Return the sets of links that only translate relative to each other."""
         return list(
             graphs.components(
                 graphs.adjacency(
@@ -246,8 +247,8 @@ class _Drawing:
         )
 
     def planes(self) -> Iterator[tuple[str, Array]]:
-        """A link, and the normal (configurations, 3), of each plane in which links slide along each other: it is a
-        direction of its own, to which what joins their points is normal."""
+        """Yield a link, and the normal (configurations, 3), of each plane in which links translate relative to each
+        other: a direction of its own, to which differences of their points are normal."""
         for body in self.sliding:
             slides = [
                 self.directions[self.axes[joint.name][0]]
@@ -264,14 +265,14 @@ class _Drawing:
                     break
 
     def together(self) -> NDArray[np.bool_]:
-        """Which centres lie on one link, or on links that only slide along each other (n, n)."""
+        """Return which centres lie on one link, or on links that only translate relative to each other (n, n)."""
         bodies = self.sliding
         on = np.array([[not body.isdisjoint(links) for body in bodies] for links in self.hosts], dtype=bool)
         return np.asarray(on @ on.T) if len(on) else np.zeros((0, 0), dtype=bool)
 
 
 def _parallels(sieve: Sieve, D: Array) -> tuple[Array, list[int]]:
-    """One direction of each class of parallels (classes, configurations, 3), and the class of each direction."""
+    """Return one direction of each class of parallels (classes, configurations, 3), and the class of each direction."""
     pairs = sieve.keep(choices(len(D), 2), lambda c, s: cross(D[c[:, 0], s], D[c[:, 1], s]), SAME_DIRECTION)
     first = list(range(len(D)))
     for a, b in pairs.tolist():
@@ -281,9 +282,10 @@ def _parallels(sieve: Sieve, D: Array) -> tuple[Array, list[int]]:
 
 
 def _tower(sieve: Sieve, classes: Array) -> tuple[tuple[tuple[tuple[int, ...], ...], ...], dict[int, int]]:
-    """What each class obeys towards those before it, in an order in which each is left a choice; its place in it.
+    """Return the incidence of each class with earlier ones, in an order in which each has a choice, and its place in
+    it.
 
-    The last is the one that lies in the fewest different planes, and so on with the rest.
+    The last is the one that lies in the fewest different planes, and so on with the others.
     """
     n = len(classes)
     normal = sieve.keep(choices(n, 2), lambda c, s: dot(classes[c[:, 0], s], classes[c[:, 1], s]), SAME_DIRECTION)
@@ -304,13 +306,13 @@ def _tower(sieve: Sieve, classes: Array) -> tuple[tuple[tuple[tuple[int, ...], .
 
 
 def _normal_of(classes: frozenset[int], directions: Array) -> Array:
-    """The normal that one or two classes stand for."""
+    """Return the normal of one or two classes."""
     first, *rest = (directions[c] for c in sorted(classes))
     return unit(cross(first, rest[0])) if rest else first
 
 
 def _number(normal: Array, known: list[Array]) -> int:
-    """The number of a normal among those known, to which it is added if it is new."""
+    """Return the index of a normal among known ones, to which a new one is added."""
     for number, other in enumerate(known):
         if np.linalg.norm(cross(normal, other)) < SAME_PLANE:
             return number
@@ -319,7 +321,7 @@ def _number(normal: Array, known: list[Array]) -> int:
 
 
 def _sight(u: Array, classes: Array, points: Array, own: Sequence[int], near: Sequence[int]) -> DirectionSource | None:
-    """What the observed direction (configurations, 3) is parallel to, of what its link offers."""
+    """Return the source of the observed direction (configurations, 3) among the directions of its link."""
 
     def along(vectors: Array) -> bool:
         sizes = np.linalg.norm(vectors, axis=1)

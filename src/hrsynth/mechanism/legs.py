@@ -1,10 +1,10 @@
-"""Legs and platform, found by structure: never by names.
+"""Legs and platform, identified by structure, never by names.
 
-The platform is the smallest set of links around the platform link that leaves the greatest number of legs, each joined
-to the base and to one link of the platform (an articulated platform has several links). A link whose segment the file
-watches is part of a leg: it is in the platform only if it is the platform link. In a single loop in which one
-chain has one freedom more than the other, the platform link is the last segment of the shorter one: the legs share the
-end joint.
+The platform is the smallest set of links around the platform link that leaves the greatest number of legs, each
+connected to the base and to one link of the platform (an articulated platform has several links). A link whose segment
+the file observes is part of a leg: it is in the platform only if it is the platform link. In a single loop in which one
+chain has one dof more than the other, the platform link is the last segment of the shorter one: the legs share the end
+joint.
 """
 
 from __future__ import annotations
@@ -27,10 +27,9 @@ from .observations.direction import Direction
 
 @dataclass(frozen=True)
 class Leg:
-    """A leg: its label, its links (base and platform excluded), its joints, the platform link it ends on.
+    """Leg: its label, its links (base and platform excluded), its joints, the platform link it ends on.
 
-    ``takes_platform`` says that the platform link itself is its last segment; its end joint is then not among its
-    joints.
+    ``takes_platform``: the platform link itself is its last segment; its end joint is then not among its joints.
     """
 
     label: str
@@ -41,11 +40,11 @@ class Leg:
 
     @property
     def has_loops(self) -> bool:
-        """Whether it is no chain of joints: loops lie inside it."""
+        """The leg is not a chain of joints: it contains loops."""
         return len(self.joints) > len(self.links) + 1
 
     def loop_joints(self, mechanism: Mechanism) -> tuple[str, ...]:
-        """Its joints that lie in loops inside it, all links beside its own taken as two: the base and the platform."""
+        """Return its joints in loops inside it, all other links taken as two: the base and the platform."""
         if not self.has_loops:
             return ()
         own = {*self.links, mechanism.base}
@@ -58,7 +57,7 @@ class Leg:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LegDecomposition(Value):
-    """A mechanism taken apart: platform links and legs, in the order of the mechanism's links."""
+    """Decomposition of a mechanism: platform links and legs, in the order of the mechanism's links."""
 
     mechanism: Mechanism
     platform: tuple[str, ...]
@@ -66,18 +65,18 @@ class LegDecomposition(Value):
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """The legs' labels, in order."""
+        """Labels of the legs, in order."""
         return tuple(leg.label for leg in self.legs)
 
     def leg(self, label: str) -> Leg:
-        """The leg with this label; raises ``BadRequest`` with the labels there are."""
+        """Return the leg with this label. Raises ``BadRequest`` with the known labels."""
         for leg in self.legs:
             if leg.label == label:
                 return leg
-        raise BadRequest(f"{self.mechanism.name} has no leg", label, self.labels)
+        raise BadRequest(f"{self.mechanism.name}: unknown leg", label, self.labels)
 
     def leg_of(self, link: str) -> Leg | None:
-        """The leg that holds a link, or None."""
+        """Return the leg with a link, or None."""
         for leg in self.legs:
             if link in leg.links or (leg.takes_platform and link == self.mechanism.platform):
                 return leg
@@ -85,9 +84,9 @@ class LegDecomposition(Value):
 
     @cached_property
     def point(self) -> Array | None:
-        """Where the platform is a point body (two or more joints, all coaxial R, or one passive S): that point, in the
-        platform's frame, (3,); on a common axis the foot of the frame's origin. None for any other platform: what
-        hangs on a single R is a tool, and its turn counts, unless the robot says that it does not."""
+        """Point of the platform if it is a point body (two or more joints, all coaxial R, or one passive S), in the
+        platform's frame, (3,); on a common axis the point nearest to the frame's origin. None for any other platform: a
+        tool on a single R rotates, and its rotation counts, unless the robot excludes it."""
         joints = self.mechanism.joints_of(self.mechanism.platform)
         frame = self.mechanism.links[self.mechanism.platform].pose
         first = joints[0]
@@ -109,8 +108,8 @@ class LegDecomposition(Value):
 
     @cached_property
     def decided(self) -> bool:
-        """Whether the links on which legs end leave the controlled one a single pose: it is one of them, or hangs on
-        links so known by two joints R or P, neither coaxial nor along one direction. Other joints may leave several."""
+        """The links on which legs end determine the pose of the platform link: it is one of them, or carried by such
+        links with two joints R or P, neither coaxial nor along one direction. Other joints may leave several poses."""
         mechanism = self.mechanism
         known, waiting = {mechanism.base, *(leg.platform_link for leg in self.legs)}, set[str]()
         while waiting != (waiting := set(self.platform) - known):
@@ -126,7 +125,7 @@ class LegDecomposition(Value):
         return mechanism.platform in known
 
     def _hold(self, one: Joint, other: Joint) -> bool:
-        """Whether two joints with links at rest leave a link one place."""
+        """Return True if two joints with fixed links leave a link one pose."""
         if not {one.type, other.type} <= {JointType.REVOLUTE, JointType.PRISMATIC}:
             return False
         if one.type is not other.type or not lines.parallel(one.axis, other.axis):
@@ -135,15 +134,16 @@ class LegDecomposition(Value):
         return one.type is JointType.REVOLUTE and apart > SAME_POINT * self.mechanism.length
 
     def floats(self, leg: Leg) -> bool:
-        """Whether a leg is no more than the free joint of a body that nothing holds."""
+        """Return True if a leg is only the free joint of a body without other joints."""
         return not leg.links and any(
             self.mechanism.joints[name].type is JointType.FREE for name in leg.joints if name in self.mechanism.joints
         )
 
     def word(self, leg: Leg) -> Word:
-        """The leg's word, from the base to the platform (without the end joint where it takes the platform).
+        """Return the leg's architecture notation, from the base to the platform (without the end joint if it takes the
+        platform).
 
-        What a virtual chain hangs on, seen from a camera on another leg, is written as if it hung on the base.
+        A virtual chain from a camera on another leg is written as if it began at the base.
         """
         mechanism = self.mechanism
         if self.floats(leg):
@@ -166,7 +166,7 @@ class LegDecomposition(Value):
         return _paths_word(graph, mechanism.base, leg.platform_link)
 
     def architecture(self) -> Architecture:
-        """The legs as a sum of words; a single loop whose legs share their end joint as one word."""
+        """Sum of the legs' notations; a single loop whose legs share their end joint is one term."""
         if len(self.legs) == 2:
             loop = self._loop_word(*self.legs)
             if loop is not None:
@@ -183,7 +183,7 @@ class LegDecomposition(Value):
         return None
 
     def path(self, leg: Leg) -> list[WordEdge]:
-        """The shortest chain of edges from the base to the leg's end, composites contracted."""
+        """Return the shortest chain of edges from the base to the leg's end, composites contracted."""
         mechanism = self.mechanism
         graph = WordGraph(
             mechanism, {mechanism.base, leg.platform_link}, {mechanism.base, leg.platform_link, *leg.links}
@@ -195,7 +195,7 @@ class LegDecomposition(Value):
 
 
 def _paths_word(graph: WordGraph, start: str, end: str) -> Word:
-    """What neither series nor parallel reduces: its simple paths side by side."""
+    """Return the notation of a graph that neither series nor parallel reduces: its simple paths side by side."""
     words = []
     for path in graphs.paths(graph.adjacency(), start, end):
         word = Word(())
@@ -208,8 +208,8 @@ def _paths_word(graph: WordGraph, start: str, end: str) -> Word:
 
 @with_value
 def decompose(mechanism: Mechanism) -> LegDecomposition:
-    """Platform and legs of a mechanism in normal form; raises ``BadMechanism`` where there is no leg, ``BadRobotFile``
-    where the observations contradict the legs."""
+    """Return platform and legs of a mechanism in normal form. Raises ``BadMechanism`` if there is no leg,
+    ``BadRobotFile`` if the observations contradict the legs."""
     graph = WordGraph(mechanism, {mechanism.base, mechanism.platform}).recognise().recognise_carriers().adjacency()
     platform = _platform(mechanism, graph)
     order = {name: i for i, name in enumerate(mechanism.links)}
@@ -227,9 +227,9 @@ def decompose(mechanism: Mechanism) -> LegDecomposition:
             legs.append(Leg("", (), (joint.name,), joint.other(mechanism.base)))
     if not legs:
         raise BadMechanism(
-            f"{mechanism.name}: no leg joins the base {mechanism.base!r} and the platform",
+            f"{mechanism.name}: no leg connects the base {mechanism.base!r} and the platform",
             mechanism.platform,
-            "a platform that is reached through at least one leg",
+            "a platform with at least one leg",
         )
     legs = _segment_platform(mechanism, platform, legs)
     joint_order = {name: i for i, name in enumerate(mechanism.joints)}
@@ -240,13 +240,13 @@ def decompose(mechanism: Mechanism) -> LegDecomposition:
 
 
 def _live(mechanism: Mechanism) -> list[Joint]:
-    """The joints but for those of bodies that nothing holds."""
+    """Return the joints except those of free bodies."""
     return [j for j in mechanism.joints.values() if j.type is not JointType.FREE]
 
 
 def _parts(mechanism: Mechanism, platform: set[str]) -> list[tuple[set[str], list[Joint], str | None]]:
-    """What is left without base and platform, part by part: its links, its joints, and the platform's link on which it
-    ends, if it is a leg: joined to the base and to one link of the platform."""
+    """Yield the parts without base and platform: links, joints, and, for a leg (connected to the base and to one link
+    of the platform), its platform link."""
     moving = {name for name in mechanism.links if name != mechanism.base and name not in platform}
     live, found = _live(mechanism), []
     joined = graphs.adjacency(
@@ -261,7 +261,7 @@ def _parts(mechanism: Mechanism, platform: set[str]) -> list[tuple[set[str], lis
 
 
 def _platform(mechanism: Mechanism, graph: graphs.Adjacency) -> set[str]:
-    """The smallest set around the platform link that leaves the most legs (articulated platforms)."""
+    """Return the smallest set around the platform link that leaves the most legs (articulated platforms)."""
     base, root = mechanism.base, mechanism.platform
     if base not in graph or root not in graph:
         return {root}
@@ -302,7 +302,7 @@ def _platform(mechanism: Mechanism, graph: graphs.Adjacency) -> set[str]:
 
 
 def _segment_platform(mechanism: Mechanism, platform: set[str], legs: list[Leg]) -> list[Leg]:
-    """In a single loop with one freedom more on one side, the platform is the last segment of the shorter leg."""
+    """Move the platform to the last segment of the shorter leg, in a single loop with one dof more on one side."""
     if len(platform) != 1 or len(legs) != 2 or len(mechanism.joints_of(mechanism.platform)) != 2:
         return legs
     decomposition = LegDecomposition(mechanism, tuple(platform), tuple(legs))
@@ -319,7 +319,7 @@ def _segment_platform(mechanism: Mechanism, platform: set[str], legs: list[Leg])
 
 
 def _freedoms(word: Word) -> int | None:
-    """The freedoms of joints in series (a Π has one, a carrier those of its chain), or None for rods side by side."""
+    """Return the dof of joints in series (a Π has one, a carrier those of its chain), or None for rods side by side."""
     total = 0
     for item in word.items:
         if isinstance(item, Letter):
@@ -332,7 +332,7 @@ def _freedoms(word: Word) -> int | None:
 
 
 def _label_legs(decomposition: LegDecomposition) -> LegDecomposition:
-    """Labels of the observations where there are any, numbers elsewhere."""
+    """Label the legs by their observations, otherwise by numbers."""
     given: dict[int, str] = {}
     watched: dict[str, Array] = {}
     defects: list[Defect] = []
@@ -349,9 +349,9 @@ def _label_legs(decomposition: LegDecomposition) -> LegDecomposition:
                 Defect(
                     file,
                     line,
-                    "observe of a link that is not in a leg",
+                    "observe: link not in a leg",
                     observation.link,
-                    f'links of the legs: {links}; others as <observe kind="direction">',
+                    f'{links}; others as <observe kind="direction">',
                 )
             )
         elif given.setdefault(index, observation.leg) != observation.leg:
@@ -359,7 +359,7 @@ def _label_legs(decomposition: LegDecomposition) -> LegDecomposition:
                 Defect(
                     file,
                     line,
-                    f"link {observation.link!r} is in the leg labelled {given[index]!r}, but is labelled",
+                    f"link {observation.link!r} is in the leg labelled {given[index]!r}; its label",
                     observation.leg,
                     given[index],
                 )
@@ -369,7 +369,7 @@ def _label_legs(decomposition: LegDecomposition) -> LegDecomposition:
                 Defect(
                     file,
                     line,
-                    "a leg's label used for links of two different legs",
+                    "label used for links of two legs",
                     observation.leg,
                     "one label per leg",
                 )
@@ -381,7 +381,7 @@ def _label_legs(decomposition: LegDecomposition) -> LegDecomposition:
                 Defect(
                     file,
                     line,
-                    "a second direction of a link",
+                    "second direction of a link",
                     observation.link,
                     'one per link; others as <observe kind="direction">',
                 )

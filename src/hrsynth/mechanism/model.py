@@ -1,7 +1,7 @@
-"""Links, joints and the mechanism they make: a frozen multigraph, its geometry given at the zero configuration.
+"""Links, joints and mechanisms: a frozen multigraph, its geometry given at the zero configuration.
 
 All points and directions are in the base link's frame *at the zero configuration*, where every loop is closed. A joint
-therefore needs no frames of its own: a centre and its axes say all. SI units, radians.
+therefore needs no frames of its own: a centre and its axes suffice. SI units, radians.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from .tilt_limit import TiltLimit
 
 
 class JointType(StrEnum):
-    """The joint types, by their letter (docs/pages/theory.md, section 1); the value is what notation prints."""
+    """Joint types, by their letter (docs/pages/theory.md, section 1); the value is what notation prints."""
 
     REVOLUTE = "R"
     PRISMATIC = "P"
@@ -38,7 +38,7 @@ class JointType(StrEnum):
 
     @property
     def freedoms(self) -> int:
-        """Freedoms that the joint leaves between its two links."""
+        """Dof of the joint's two links relative to each other."""
         return {"R": 1, "P": 1, "U": 2, "S": 3, "C": 2, "E": 3, "F": 0, "6": 6}[self.value]
 
     @property
@@ -48,7 +48,7 @@ class JointType(StrEnum):
 
     @property
     def slides(self) -> bool:
-        """Whether the joint lets its two links translate along its axis (P and C)."""
+        """The joint lets its two links translate along its axis (P and C)."""
         return self.value in ("P", "C")
 
 
@@ -63,7 +63,7 @@ class Limits:
 
 
 class JointRange(NamedTuple):
-    """From where to where (m, rad) a joint's coordinate goes, infinite if there is no limit, and which one it is."""
+    """Range (m, rad) of a joint's coordinate, infinite without limits, and the index of that coordinate."""
 
     joint: str
     place: int
@@ -73,7 +73,7 @@ class JointRange(NamedTuple):
 
 @dataclass(frozen=True)
 class Motor:
-    """An actuator: the name of its transmission; ``xml`` keeps the element of the file it came from."""
+    """Actuator: the name of its transmission; ``xml`` keeps the element of the file it came from."""
 
     name: str
     xml: str | None = None
@@ -81,7 +81,7 @@ class Motor:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Link(Value):
-    """A rigid body: its frame's pose X_BL at the zero configuration (4, 4); ``xml`` keeps unknown child elements."""
+    """Rigid body: its frame's pose X_BL at the zero configuration (4, 4); ``xml`` keeps unknown child elements."""
 
     name: str
     pose: Array = field(default_factory=lambda: frozen(np.eye(4)))
@@ -99,10 +99,9 @@ class Link(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Joint(Value):
-    """A joint: ``point`` its centre (3,), ``axes`` unit vectors (R, P, C: one; planar: the normal; U: the first fixed
-    in the predecessor, the second in the successor); its coordinate is the successor's motion seen from the
-    predecessor.
-    """
+    """Joint: ``point`` its centre (3,), ``axes`` unit vectors (R, P, C: one; planar: the normal; U: the first fixed in
+    the predecessor, the second in the successor); its coordinate is the successor's motion seen from the
+    predecessor."""
 
     name: str
     type: JointType
@@ -113,17 +112,17 @@ class Joint(Value):
     motor: Motor | None = None
     limits: Limits | None = None
     in_tree: bool = True
-    """Whether a file writes it as a tree joint (else as a loop)."""
+    """A file writes it as a tree joint (else as a loop)."""
     xml: tuple[str, ...] = ()
     line: int | None = field(default=None, compare=False)
     wrist: TiltLimit | None = None
-    """The turns of a spherical joint that stands for several R, where they are limited or of three R (normal form)."""
+    """Tilt limit of a spherical joint that stands for several R, if they are limited or three (normal form)."""
     turns: tuple[tuple[str, Limits | None], ...] = ()
     """Names and limits of the two R that a U stands for, in the order of its axes (normal form)."""
     offset: Array | None = None
-    """Where the file counts from, None for the zero configuration: of R, P, U and C the file's coordinates (m, rad) at
-    the zero configuration; of others the displacement (4, 4), in the base's frame with the predecessor at rest, that
-    brings the successor to the file's zero."""
+    """Coordinates of the file at the zero configuration (m, rad) of R, P, U and C; of others the displacement (4, 4),
+    in the base's frame with a fixed predecessor, that brings the successor to the file's zero. None if they are
+    zero."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "type", JointType(self.type))
@@ -139,12 +138,12 @@ class Joint(Value):
 
     @property
     def axis(self) -> Array:
-        """The (first) axis."""
+        """First or only axis."""
         return self.axes[0]
 
     @property
     def actuated(self) -> bool:
-        """Whether a motor drives the joint."""
+        """A motor drives the joint."""
         return self.motor is not None
 
     @property
@@ -153,11 +152,11 @@ class Joint(Value):
         return self.predecessor, self.successor
 
     def other(self, link: str) -> str:
-        """The link at the other end."""
+        """Return the link at the other end."""
         return self.successor if link == self.predecessor else self.predecessor
 
     def turned(self) -> Joint:
-        """The same joint with predecessor and successor exchanged (its coordinate keeps its sign)."""
+        """Return the joint with predecessor and successor exchanged (its coordinate keeps its sign)."""
         return self._turned
 
     @cached_property
@@ -178,7 +177,7 @@ class Joint(Value):
         )
 
     def relinked(self, old: str, new: str) -> Joint:
-        """The joint with its end on ``old`` moved to ``new``."""
+        """Return the joint with its end on ``old`` moved to ``new``."""
         if old == self.predecessor:
             return replace(self, predecessor=new)
         return replace(self, successor=new)
@@ -186,7 +185,7 @@ class Joint(Value):
 
 @dataclass(frozen=True)
 class Coupling:
-    """A gear: coordinate of the joint that carries ``successor`` = ratio × that of the carrier of ``predecessor``."""
+    """Coupling: coordinate of the joint that carries ``successor`` = ratio × that of the carrier of ``predecessor``."""
 
     name: str
     predecessor: str
@@ -197,13 +196,13 @@ class Coupling:
 
 @dataclass(frozen=True)
 class Note:
-    """Something that a file does not say and that was settled while reading it: a ``guess`` that an option overrides,
-    or what was ``solved``, ``merged``, ``ignored`` or left ``open``."""
+    """Note of reading a file: an ``assumption`` that an option overrides, or what was ``solved``, ``merged``,
+    ``ignored`` or left ``open``."""
 
     kind: str
     text: str
     base: bool = False
-    """Whether it tells which link is taken for the base."""
+    """The note is about the assumed base."""
 
     def __str__(self) -> str:
         return f"{self.kind}: {self.text}"
@@ -211,25 +210,25 @@ class Note:
 
 @dataclass(frozen=True)
 class PlatformChoice:
-    """How the platform was chosen: by the ``file``, an ``option`` or a ``guess``; and the reason, in words. Where it is
-    left ``open``, the reason says why, and with what it would be named."""
+    """Choice of the platform: by the ``file``, an ``option`` or an ``assumption``; and the reason. If it is ``open``,
+    the reason names the option."""
 
     chosen: str
     reason: str
 
     def __str__(self) -> str:
-        return f"a guess: {self.reason}" if self.chosen == "guess" else self.reason
+        return f"assumed: {self.reason}" if self.chosen == "assumption" else self.reason
 
 
 NAMED = PlatformChoice("file", "named in the file")
 GIVEN = PlatformChoice("option", "given by --platform")
 FIRST = PlatformChoice("file", "the first of the bodies that observe or are observed")
-"""Of a formation."""
+"""Choice of a formation."""
 
 
 def likely_motors(base: str, joints: Sequence[Any]) -> tuple[list[str], str]:
-    """The joints that could be driven, by their names, and which these are: those at the base and at what is fixed to
-    it; where no loop is closed all."""
+    """Return the joints that could have motors, and which these are: those at the base and links fixed to it; without a
+    loop all."""
     fixed = component(adjacency((base,), (joint.links for joint in joints if joint.type is JointType.FIXED)), base)
     moving = (joint for joint in joints if joint.type not in (JointType.FIXED, JointType.FREE))
     if len(joints) < len({link for joint in joints for link in joint.links}):
@@ -238,12 +237,12 @@ def likely_motors(base: str, joints: Sequence[Any]) -> tuple[list[str], str]:
 
 
 def _counted(bound: float, joint: Joint) -> float:
-    """A limit from the file's zero, to the digits that adding and taking away leaves."""
+    """Return a limit from the file's zero, to the digits of its addition."""
     return bound if joint.offset is None or joint.offset.size > 1 else float(f"{bound + joint.offset[0]:.15g}")
 
 
 def fresh_name(name: str, *taken: Container[str]) -> str:
-    """``name``, or ``name_2``, ``name_3`` … if it is taken; not the first of these where names between are free."""
+    """Return ``name``, or ``name_2``, ``name_3`` … if it is taken; not the first of these if names between are free."""
 
     def free(number: int) -> bool:
         return not any(f"{name}_{number}" in each for each in taken)
@@ -271,36 +270,37 @@ class Mechanism(Result, shown_as="robot"):
     observations: tuple[Observation, ...] = ()
     couplings: tuple[Coupling, ...] = ()
     camera: str | None = None
-    """The reference link, the one that carries the camera; None means the base."""
+    """Reference link, which carries the camera; None means the base."""
     xml: tuple[str, ...] = ()
     file: str | None = field(default=None, compare=False)
     notes: tuple[Note, ...] = field(default=(), compare=False)
-    """What reading the file had to settle."""
+    """Notes of reading the file."""
     options: tuple[str, ...] = field(default=(), compare=False)
-    """The options of the command line with which its file was read."""
+    """Options of the command line with which its file was read."""
     sha256: str | None = field(default=None, compare=False)
-    """The hash of that file's bytes."""
+    """Hash of that file's bytes."""
     cameras: tuple[NamedCamera, ...] = ()
-    """The cameras that have a name: what observations of their own reference see from."""
+    """Named cameras, for observations with their own reference."""
     formation: bool = False
-    """Whether no platform is named: all bodies of :attr:`bodies` are what is controlled, up to the motions that no
-    observation could tell; ``platform`` is then only the first of them."""
+    """No platform is named: all :attr:`bodies` are controlled, up to trivial motions; ``platform`` is only the first of
+    them."""
     turns: bool | None = None
-    """Whether the platform's turn counts, as it does in the real robot of a hidden one; None: by the joints."""
+    """The platform's rotation is controlled, as in the real robot of a hidden one; None: decided by the joints."""
     choice: PlatformChoice | None = field(default=None, compare=False)
-    """How the platform was chosen; None in a mechanism that was read from no file."""
+    """Choice of the platform; None in a mechanism that was not read from a file."""
     scale: float | None = field(default=None, compare=False)
-    """The characteristic length (m) of the robot whose zero configuration was moved; None where it was not."""
+    """Characteristic length (m) of the robot whose zero configuration was moved; None if it was not."""
     written: Mechanism | None = field(default=None, compare=False)
-    """Of a normal form the robot as its file has it; None where they are the same."""
+    """Robot of the file, for a normal form; None if they are the same."""
 
     def headline(self) -> str:
-        """The name, and the number of its parts."""
+        """Name and number of parts."""
         motors = sum(joint.actuated for joint in self.joints.values())
         return f"{self.name}, {len(self.links)} links, {len(self.joints)} joints, {motors} motors"
 
     def to_pinocchio(self) -> Any:
-        """The robot as ``hrsynth.to_pinocchio`` gives it: model, constraint models, reference configuration, names."""
+        """Return the robot as ``hrsynth.to_pinocchio`` does: model, constraint models, reference configuration,
+        names."""
         return Result.public("to_pinocchio")(self)
 
     def said(self) -> tuple[Any, ...]:
@@ -325,29 +325,29 @@ class Mechanism(Result, shown_as="robot"):
                 raise BadMechanism(f"joint {joint.name!r} is filed under", key, joint.name)
             for link in joint.links:
                 if link not in self.links:
-                    raise BadMechanism(f"joint {joint.name!r} names an unknown link", link, sorted(self.links))
+                    raise BadMechanism(f"joint {joint.name!r}: unknown link", link, sorted(self.links))
             if joint.predecessor == joint.successor:
-                raise BadMechanism(f"joint {joint.name!r} joins a link to itself", joint.predecessor)
+                raise BadMechanism(f"joint {joint.name!r} connects a link to itself", joint.predecessor)
         for role, link in (("base", self.base), ("platform", self.platform), ("camera", self.reference)):
             if link not in self.links:
                 raise BadMechanism(f"unknown {role} link", link, sorted(self.links))
 
     @classmethod
     def of(cls, name: str, links: Iterable[Link], joints: Iterable[Joint], **rest: object) -> Mechanism:
-        """A mechanism from sequences of links and joints; the first link is the base unless ``base`` is given."""
+        """Return a mechanism of links and joints; the first link is the base unless ``base`` is given."""
         table = {link.name: link for link in links}
         rest.setdefault("base", next(iter(table)))
         return cls(name=name, links=table, joints={joint.name: joint for joint in joints}, **rest)  # type: ignore[arg-type]
 
     @property
     def reference(self) -> str:
-        """The reference link: observed directions are relative to it."""
+        """Reference link: observed directions are relative to it."""
         return self.base if self.camera is None else self.camera
 
     @property
     def bodies(self) -> tuple[str, ...]:
-        """What is controlled: the platform; of a formation all links that are observed, carry what observes, or end a
-        chain, the base left out, in the order of the links but for the platform, which is first."""
+        """Controlled links: the platform; of a formation all links that are observed, carry what observes, or end a
+        chain, without the base, in the order of the links but the platform first."""
         if not self.formation:
             return (self.platform,)
         told = {self.base: False} | {link: len(self._joints_of[link]) == 1 for link in self.links if link != self.base}
@@ -357,43 +357,41 @@ class Mechanism(Result, shown_as="robot"):
 
     @property
     def platform_words(self) -> str:
-        """The platform, or the bodies of a formation, and how it was chosen."""
+        """Platform, or bodies of a formation, and how it was chosen."""
         bodies = "none" if self.open_platform else ", ".join(self.bodies)
         return bodies + ("" if self.choice is None else f" ({self.choice})")
 
     @property
     def open_platform(self) -> bool:
-        """Whether the file names no platform and several could be: ``platform`` is then only the first of these."""
+        """The file names no platform and several links could be it: ``platform`` is only the first of these."""
         return self.choice is not None and self.choice.chosen == "open"
 
     def require_platform(self) -> None:
-        """Raise ``NoPlatform`` where the platform is open."""
+        """Raise ``NoPlatform`` if the platform is open."""
         if self.open_platform:
             raise NoPlatform(f"{self.file or self.name}: {self.choice}")
 
     @property
     def proposed_motors(self) -> str | None:
-        """That no joint is driven, and which could be; None where there are none of either."""
+        """Message that no joint has a motor, and which could; None if there are motors, or no candidates."""
         names, which = likely_motors(self.base, list(self.joints.values()))
         if not names or any(joint.actuated for joint in self.joints.values()):
             return None
-        return f"no joint is driven: --motors {','.join(names)} could be ({which})"
+        return f"no joint has a motor: try --motors {','.join(names)} ({which})"
 
     def require_motors(self) -> None:
-        """Raise ``BadRequest`` where no joint is driven."""
+        """Raise ``BadRequest`` if no joint has a motor."""
         if not any(joint.actuated for joint in self.joints.values()):
-            told = (self.proposed_motors or "").removeprefix("no joint is driven: ")
-            raise BadRequest(
-                f"{self.name} has no motor", None, f"one or more: --motors names them{told and f'; {told}'}"
-            )
+            told = (self.proposed_motors or "").removeprefix("no joint has a motor: ")
+            raise BadRequest(f"{self.name}: no motor", remedy=f"Name one or more with --motors{told and f': {told}'}.")
 
     @cached_property
     def adjacency(self) -> Adjacency:
-        """The links in order, each with those that a joint joins it to."""
+        """Links in order, each with its neighbours."""
         return adjacency(self.links, (joint.links for joint in self.joints.values()))
 
     def carrier(self, coupling: Coupling, link: str) -> Joint:
-        """The joint whose coordinate a coupling means by a link; raises ``BadMechanism`` if there is none."""
+        """Return the joint whose coordinate a coupling means by a link. Raises ``BadMechanism`` if there is none."""
         for joint in self.joints.values():
             if joint.successor == link and joint.in_tree and joint.type.freedoms == 1:
                 return joint
@@ -401,7 +399,7 @@ class Mechanism(Result, shown_as="robot"):
 
     @cached_property
     def joint_ranges(self) -> dict[str, tuple[float, float]]:
-        """The joints whose coordinates are limited: lower and upper limit (m, rad), infinite if there is none."""
+        """Joints with limits: lower and upper limit (m, rad), infinite if absent."""
         return {
             name: (lower, upper)
             for name, (joint, _, lower, upper) in self.stops.items()
@@ -410,7 +408,7 @@ class Mechanism(Result, shown_as="robot"):
 
     @cached_property
     def stops(self) -> dict[str, JointRange]:
-        """The same, and each R with limits that is joined with another into a U."""
+        """Joints with limits, and each R with limits that is joined with another into a U."""
         given = {
             name: (joint.name, place, limits.lower, limits.upper)
             for joint in self.joints.values()
@@ -424,7 +422,7 @@ class Mechanism(Result, shown_as="robot"):
 
     @cached_property
     def filed(self) -> dict[str, tuple[float, float]]:
-        """The same as :attr:`joint_ranges`, as the file counts."""
+        """Joints with limits as in :attr:`joint_ranges`, as the file counts."""
         return {
             name: (_counted(lower, self.joints[name]), _counted(upper, self.joints[name]))
             for name, (lower, upper) in self.joint_ranges.items()
@@ -432,7 +430,7 @@ class Mechanism(Result, shown_as="robot"):
 
     @cached_property
     def idle(self) -> tuple[str, ...]:
-        """The floating joints of links that other joints hold: they hold nothing and have no coordinates."""
+        """Floating joints of links that other joints carry: they constrain nothing and have no coordinates."""
         joints = list(self.joints.values())
         floats = [joint.type is JointType.FREE for joint in joints]
         tree = {joint.name for joint in spanning_forest(self.links, joints, floats)} if any(floats) else self.joints
@@ -440,15 +438,15 @@ class Mechanism(Result, shown_as="robot"):
 
     @cached_property
     def tilt_limits(self) -> dict[str, TiltLimit]:
-        """The spherical joints that cannot make every turn."""
+        """Spherical joints that cannot make every rotation."""
         return {
             name: joint.wrist for name, joint in self.joints.items() if joint.wrist is not None and joint.wrist.limits
         }
 
     @cached_property
     def length(self) -> float:
-        """The characteristic length (m): mean distance of the joint centres from their centroid; 1 if they coincide, up
-        to rounding. It stays the same when another configuration becomes the zero configuration."""
+        """Characteristic length (m): mean distance of the joint centres from their centroid; 1 if they coincide, up to
+        rounding. It does not change with the zero configuration."""
         if self.scale is not None or not self.joints:
             return self.scale or 1.0
         points = np.array([joint.point for joint in self.joints.values()])
@@ -464,7 +462,7 @@ class Mechanism(Result, shown_as="robot"):
         return {name: tuple(joints) for name, joints in table.items()}
 
     def joints_of(self, link: str) -> tuple[Joint, ...]:
-        """The joints of a link, in the order of the mechanism."""
+        """Return the joints of a link, in the order of the mechanism."""
         return self._joints_of[link]
 
     def changed(
@@ -476,8 +474,8 @@ class Mechanism(Result, shown_as="robot"):
         joints: Iterable[Joint] = (),
         **fields: object,
     ) -> Mechanism:
-        """A new mechanism: links removed with all their joints and couplings, joints removed, links and joints added or
-        replaced."""
+        """Return a new mechanism: links removed with all their joints and couplings, joints removed, links and joints
+        added or replaced."""
         gone = set(remove_links)
         new_links = {name: link for name, link in self.links.items() if name not in gone}
         new_links.update({link.name: link for link in links})
@@ -491,11 +489,12 @@ class Mechanism(Result, shown_as="robot"):
         return replace(self, links=new_links, joints=new_joints, **fields)  # type: ignore[arg-type]
 
     def fresh(self, name: str) -> str:
-        """``name``, or ``name_2``, ``name_3`` … if it is taken by a link or a joint."""
+        """Return ``name``, or ``name_2``, ``name_3`` … if it is taken by a link or a joint."""
         return fresh_name(name, self.links, self.joints)
 
     def differences(self, other: Mechanism, tolerance: float = SAME_GEOMETRY) -> list[str]:
-        """What differs from ``other``, in words; empty if they are the same mechanism (names, order, geometry)."""
+        """Return the differences from ``other`` as texts; empty if they are the same mechanism (names, order,
+        geometry)."""
         found: list[str] = []
 
         def compare(what: str, mine: object, theirs: object) -> None:

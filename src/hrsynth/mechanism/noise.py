@@ -1,4 +1,4 @@
-"""How wrong measurements are: amounts as a user writes them, and what simulated sensors make of them to first order."""
+"""Noise of measurements: amounts as a user writes them, and their first-order effect on simulated sensors."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from ..tolerances import NOISE_STEP
 from .cameras import CameraObservation
 from .observation import Observation
 
-EXAMPLE = "0.1deg or 0.002 (radians), 0.3px in a picture, 1mm of lengths; several with commas"
+EXAMPLE = "0.1deg or 0.002 (rad), 0.3px in the image, 1mm of lengths; several separated by commas"
 UNITS = {"px": ("px", 1.0), "deg": ("rad", math.radians(1)), "mm": ("m", 1e-3), "m": ("m", 1.0), "": ("rad", 1.0)}
-"""Endings of amounts, the longer ones first: what they are told in, and how much of it one is."""
+"""Suffixes of amounts, the longer ones first: unit of the error, and factor to it."""
 IN_WORDS = {"px": ("pixels", "0.3px"), "rad": ("angles", "0.1deg"), "m": ("lengths", "1mm")}
-"""What errors are told in, in words, and how a user writes such an amount."""
+"""Quantities of errors, and an example of each."""
 MOST = {"px": WIDEST_NOISE, "rad": math.pi / 2, "m": math.inf}
 
 
 @dataclass(frozen=True)
 class Noise:
-    """How large errors are, by what they are told in: half-angles of cones (``rad``), errors in the picture (``px``),
-    of lengths (``m``); of a ``bias`` each error stays the same all along a run."""
+    """Amounts of noise by unit: half-angles of cones (``rad``), errors in the image (``px``), of lengths (``m``); with
+    ``bias`` each error is constant along a run."""
 
     amounts: tuple[tuple[str, float], ...]
     bias: bool = False
 
     @classmethod
     def read(cls, given: object) -> Noise | None:
-        """What is given as a text, or is that already; raises ``BadRequest``."""
+        """Return the noise of a text or of a Noise. Raises ``BadRequest``."""
         if given is None or isinstance(given, Noise):
             return given
         if not isinstance(given, str):
@@ -43,7 +43,7 @@ class Noise:
 
     @classmethod
     def parse(cls, text: str) -> Noise:
-        """The amounts that ``0.1deg``, ``0.002``, ``0.3px`` or ``0.3px,1mm`` says; raises ``BadRequest``."""
+        """Return the noise of ``0.1deg``, ``0.002``, ``0.3px`` or ``0.3px,1mm``. Raises ``BadRequest``."""
         found: dict[str, float] = {}
         for word in map(str.strip, text.split(",")):
             ending = next(each for each in UNITS if word.endswith(each))
@@ -56,14 +56,14 @@ class Noise:
                 raise BadRequest(
                     "noise",
                     text,
-                    "each unit once, more than zero; angles below 90deg (a number alone is "
+                    "each unit once, more than 0; angles below 90deg (a number without unit is "
                     f"in radians), below {WIDEST_NOISE:g}px",
                 )
             found[unit] = value
         return cls(tuple(found.items()))
 
     def of(self, unit: str) -> float:
-        """The amount in a unit, 0 where none is."""
+        """Return the amount in a unit, 0 if there is none."""
         return dict(self.amounts).get(unit, 0.0)
 
     def __str__(self) -> str:
@@ -72,16 +72,15 @@ class Noise:
         return ", ".join(every) + (", constant over time" if self.bias else "")
 
     def amounts_for(self, observations: Sequence[Observation]) -> dict[str, float]:
-        """The amounts; raises ``BadRequest`` for noise that none of the observations has, and for pixels of a camera
-        without a focal length."""
+        """Return the amounts. Raises ``BadRequest`` for noise that none of the observations has, and for pixels of a
+        camera without a focal length."""
         known = frozenset().union(*(each.found_by for each in observations))
         for unit, _ in self.amounts:
             if unit not in known:
                 raise BadRequest(
-                    f"noise: nothing that is observed has errors in {IN_WORDS[unit][0]}",
+                    f"noise: no observation has errors in {IN_WORDS[unit][0]}",
                     str(self),
-                    [IN_WORDS[each][1] for each in sorted(known)]
-                    or "more to observe (--sensor): directions have cones",
+                    [IN_WORDS[each][1] for each in sorted(known)] or "further observations (--sensor)",
                 )
         amounts = dict(self.amounts)
         for each in observations:
@@ -91,7 +90,7 @@ class Noise:
                 and not (isinstance(each, CameraObservation) and each.camera and each.camera.focal)
             ):
                 raise BadRequest(
-                    f"noise in pixels: the focal length of the camera of {each.kind} {each.leg}",
+                    f"noise in pixels: focal length of the camera of {each.kind} {each.leg}",
                     "none",
                     "a camera with one (--camera NAME=LINK@x,y,z/r,p,y/FOCAL)",
                 )
@@ -99,13 +98,13 @@ class Noise:
 
 
 def vectors(seen: Observation) -> int:
-    """How many random vectors an observation's noise takes."""
+    """Return the number of random vectors of an observation's noise."""
     return 1 if seen.size <= 3 else 2
 
 
 def blurs(seen: Observation, value: Array, amounts: Mapping[str, float]) -> list[Array]:
-    """The rates (size, 3) of :meth:`.Observation.sense` by each random vector where there is none, by central
-    differences: to first order the errors are the sums of images of unit balls. ``value`` (size,) in metres."""
+    """Return the rates (size, 3) of :meth:`.Observation.sense` by each random vector at zero, by central differences:
+    to first order the errors are the sums of images of unit balls. ``value`` (size,) in metres."""
     own = {unit: amount for unit, amount in amounts.items() if unit in seen.found_by}
     if not own:
         return []

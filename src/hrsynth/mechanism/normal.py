@@ -1,9 +1,9 @@
-"""The normal form of a mechanism: joints that act as one are one.
+"""Normal form of a mechanism: joints that act as one are one.
 
-* links held together by a fixed joint are one link;
+* links connected by a fixed joint are one link;
 * two coaxial R are one R, two parallel P one P;
 * two perpendicular R that meet are a U; three independent R that meet (or a U and an R) are an S; an R through the
-  centre of an S adds nothing. What turns the S then cannot make is kept as its ``wrist``.
+  centre of an S adds nothing. Rotations that the S then cannot make are kept as its ``tilt_limit``.
 
 A link between two merged joints disappears; the base, the platform, the camera's link and observed links never do.
 """
@@ -27,9 +27,8 @@ from .tilt_limit import Interval, TiltLimit, chain_arcs
 
 @dataclass(frozen=True, eq=False, repr=False)
 class NormalForm(Value):
-    """The mechanism in normal form, and where its links went: ``into[old]`` is the link that took ``old`` in; how far
-    axes and centres were moved, all together, to make one joint of several (m); of which joints each such one is made.
-    """
+    """Mechanism in normal form, and where its links went: ``into[old]`` is the link that took ``old`` in; how far axes
+    and centres were moved in all to make one joint of several (m); the joints of each such one."""
 
     mechanism: Mechanism
     into: dict[str, str]
@@ -39,7 +38,7 @@ class NormalForm(Value):
 
 @with_value
 def normal_form(mechanism: Mechanism) -> NormalForm:
-    """Merge until nothing merges; names, frames and order of what stays are kept."""
+    """Merge until nothing merges; names, frames and order of the remaining parts are kept."""
     into = {name: name for name in mechanism.links}
     current = _without_fixed(mechanism, into)
     moved, made_of = 0.0, dict[str, tuple[str, ...]]()
@@ -54,7 +53,7 @@ def normal_form(mechanism: Mechanism) -> NormalForm:
 
 
 def _moved_by(old: Joint, new: Joint, length: float) -> float:
-    """How far the axes of a joint are from those of the joint that takes its place, within a length (m)."""
+    """Return the distance of the axes of a joint from those of the joint that replaces it, within a length (m)."""
     found = 0.0
     for axis in old.axes:
         if old.type in (JointType.REVOLUTE, JointType.UNIVERSAL):
@@ -69,13 +68,13 @@ def _protected_names(mechanism: Mechanism) -> set[str]:
 
 
 def _watching(mechanism: Mechanism) -> list[str]:
-    """The links that are observed, or from which others are."""
+    """Return the links that are observed, or from which others are."""
     seen = [o.link for o in mechanism.observations]
     return seen + [o.seen_from for o in mechanism.observations if o.seen_from is not None]
 
 
 def _without_fixed(mechanism: Mechanism, into: dict[str, str]) -> Mechanism:
-    """Every group of links held together by fixed joints becomes one: the base, the platform, the camera's link or an
+    """Merge every group of links connected by fixed joints into one: the base, the platform, the camera's link or an
     observed link if the group has one, else the first in the mechanism's order."""
     fixed = [j for j in mechanism.joints.values() if j.type is JointType.FIXED]
     if not fixed:
@@ -88,7 +87,7 @@ def _without_fixed(mechanism: Mechanism, into: dict[str, str]) -> Mechanism:
     for group in graphs.components(bonds):
         kept = min(group, key=order.__getitem__)
         if kept == mechanism.base and mechanism.platform in group:
-            raise BadMechanism("the platform is fixed to the base", mechanism.platform, "a platform that moves")
+            raise BadMechanism("the platform is fixed to the base", mechanism.platform, "a movable platform")
         members = [name for name in mechanism.links if name in group and name != kept]
         into.update({name: kept for name in members})
         gone.update(members)
@@ -119,8 +118,8 @@ def _without_fixed(mechanism: Mechanism, into: dict[str, str]) -> Mechanism:
 
 
 def _next_merge(mechanism: Mechanism) -> tuple[list[str], list[Joint], Joint] | None:
-    """The links between, the joints that go, and the joint that takes their place; a U of two R with centres apart only
-    where nothing else merges, as axes of two balls on one rod may meet as well."""
+    """Return the links between, the joints that go, and the joint that replaces them; a U of two R with distant centres
+    only if nothing else merges, as axes of two spherical joints on one rod may meet as well."""
     far: tuple[list[str], list[Joint], Joint] | None = None
     held = _protected_names(mechanism) | {link for c in mechanism.couplings for link in (c.predecessor, c.successor)}
     free = [name for name in mechanism.links if name not in held and len(mechanism.joints_of(name)) == 2]
@@ -148,7 +147,7 @@ def _next_merge(mechanism: Mechanism) -> tuple[list[str], list[Joint], Joint] | 
 
 
 def _pair(mechanism: Mechanism, a: Joint, b: Joint) -> Joint | None:
-    """The joint that acts as a then b (b after a), or None."""
+    """Return the joint that acts as a then b (b after a), or None."""
     near = SAME_POINT * mechanism.length
     kinds = a.type.value + b.type.value
     if kinds == "RR":
@@ -185,8 +184,7 @@ def _join(
     wrist: TiltLimit | None = None,
     turns: tuple[tuple[str, Limits | None], ...] = (),
 ) -> Joint:
-    """One joint from a's predecessor to b's successor, without limits of its own: of a's type and place where none is
-    given."""
+    """Return one joint from a's predecessor to b's successor, without limits; by default of a's type and centre."""
     if type is None or point is None:
         return replace(a, predecessor=a.predecessor, successor=b.successor, limits=None, offset=None)
     return replace(
@@ -204,7 +202,7 @@ def _join(
 
 
 def _wrist(*joints: Joint) -> TiltLimit | None:
-    """What turns several joints about one centre, one after the other, cannot make together."""
+    """Return the tilt limit of several rotations about one centre in series."""
     ends: tuple[Array, Array] | None = None
     span: Interval = 0.0, 0.0
     count = 0
@@ -256,7 +254,7 @@ def _first(mechanism: Mechanism, joints: list[Joint]) -> str:
 
 
 def _replace_joint(mechanism: Mechanism, between: list[str], gone: list[Joint], joint: Joint) -> Mechanism:
-    """``joint`` in the place (name and order) of the first of ``gone`` in the mechanism's order."""
+    """Put ``joint`` in the place (name and order) of the first of ``gone`` in the mechanism's order."""
     joint = replace(joint, name=_first(mechanism, gone), xml=())
     order = list(mechanism.joints)
     changed = mechanism.changed(remove_links=between, remove_joints=[j.name for j in gone], joints=[joint])
@@ -264,8 +262,8 @@ def _replace_joint(mechanism: Mechanism, between: list[str], gone: list[Joint], 
 
 
 def centre_pair(a: Joint, b: Joint) -> tuple[Array, Array]:
-    """The centres of two joints of one link, as a segment sees them: an R's centre is the foot, on its axis, of the
-    perpendicular from the other's centre (two R: the feet of their common perpendicular)."""
+    """Return the end points of the segment between two joints of one link: an R's centre is the point of its axis
+    nearest to the other's centre (two R: the ends of their common perpendicular)."""
     a_line, b_line = a.type is JointType.REVOLUTE, b.type is JointType.REVOLUTE
     if a_line and b_line:
         return lines.common_perpendicular(a.point, a.axis, b.point, b.axis)

@@ -1,8 +1,8 @@
-"""Architectures in words: ``4-R̲-{2-SS}``, ``R̲RR+2-P̲RR``, ``{RR|Π-U̲R}-S``; printed and parsed.
+"""Architecture notation: ``4-R̲-{2-SS}``, ``R̲RR+2-P̲RR``, ``{RR|Π-U̲R}-S``; printed and parsed.
 
 Letters are joint types, Π a planar parallelogram; a bar under a letter (``*`` after it in ASCII) is a motor. Braces
-hold what stands in parallel: ``{2-SS}`` two equal parallel rods, ``{a|b}`` chains side by side, ``{R-PP}`` a chain R
-whose end carries a link that only translates on PP (MMT Fig. 4(b)).
+hold parallel parts: ``{2-SS}`` two equal parallel rods, ``{a|b}`` chains side by side, ``{R-PP}`` a chain R whose end
+carries a link that only translates on PP (MMT Fig. 4(b)).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ..errors import BadRequest
 
 
 class Style(Enum):
-    """How an architecture is written."""
+    """Style of a written architecture."""
 
     UNICODE = "unicode"
     ASCII = "ascii"
@@ -71,7 +71,7 @@ class Bar:
 
 @dataclass(frozen=True)
 class Carrier:
-    """A chain whose end carries a link that only translates, held by sliders: ``{R-PP}``."""
+    """Chain whose end carries a link that only translates, guided by P joints: ``{R-PP}``."""
 
     chain: Word
     sliders: Word
@@ -93,7 +93,7 @@ class Word:
     items: tuple[Item, ...]
 
     def text(self, style: Style = Style.UNICODE, *, spaced: bool = False) -> str:
-        """Groups are set off by ``-``; inside a bar (``spaced``) so is a Π."""
+        """Return the text; groups are separated by ``-``, inside a bar (``spaced``) also a Π."""
         text = ""
         for index, item in enumerate(self.items):
             if index:
@@ -116,13 +116,13 @@ class Word:
 
 @dataclass(frozen=True)
 class Architecture:
-    """A sum of equal legs: (count, word) in the order of first appearance."""
+    """Sum of equal legs: (count, notation) in the order of first appearance."""
 
     terms: tuple[tuple[int, Word], ...]
 
     @classmethod
     def of(cls, words: Sequence[Word]) -> Architecture:
-        """The architecture of legs given one by one."""
+        """Return the architecture of a sequence of legs."""
         counts: dict[Word, int] = {}
         for word in words:
             counts[word] = counts.get(word, 0) + 1
@@ -133,17 +133,17 @@ class Architecture:
 
     @property
     def unicode(self) -> str:
-        """With combining low lines under motors."""
+        """Text with combining low lines under motors."""
         return self.text(Style.UNICODE)
 
     @property
     def ascii(self) -> str:
-        """With ``*`` after motors and ``Pi``."""
+        """Text with ``*`` after motors and ``Pi``."""
         return self.text(Style.ASCII)
 
     @property
     def latex(self) -> str:
-        """For math mode."""
+        """Text for math mode."""
         return self.text(Style.LATEX)
 
     def __str__(self) -> str:
@@ -160,7 +160,7 @@ _TOKEN = re.compile(
 
 
 def parse(text: str) -> Architecture:
-    """The architecture that ``text`` (Unicode or ASCII) writes; raises ``BadRequest`` with the place of the fault."""
+    """Return the architecture of ``text`` (Unicode or ASCII). Raises ``BadRequest`` with the place of the error."""
     return _Parser(text).architecture()
 
 

@@ -1,4 +1,4 @@
-"""A part of a mechanism: all that lies between a base and a platform of one's own choice, nothing else."""
+"""Part of a mechanism: everything between a chosen base and platform, nothing else."""
 
 from __future__ import annotations
 
@@ -9,16 +9,17 @@ from .model import Mechanism, Note
 
 
 def between(mechanism: Mechanism, base: str, platform: str) -> Mechanism:
-    """The links and joints on any way from ``base`` to ``platform`` that visits no link twice; the base rests.
+    """Return the links and joints on any path from ``base`` to ``platform`` that visits no link twice; the base is
+    fixed.
 
-    Open branches and loops that hang on one link are left out: they do not hinder. Raises ``BadRequest`` for unknown
-    links and where no way joins the two.
+    Open branches and loops on one link are left out: they do not constrain. Raises ``BadRequest`` for unknown links and
+    if no path connects the two.
     """
     for role, link in (("base", base), ("platform", platform)):
         if link not in mechanism.links:
             raise BadRequest(f"{mechanism.name}: no such {role} link", link, ", ".join(list(mechanism.links)[:20]))
     if base == platform:
-        raise BadRequest(f"{mechanism.name}: base and platform are one link", base, "two links")
+        raise BadRequest(f"{mechanism.name}: base and platform are the same link", base, "two links")
     import networkx as nx
 
     graph: nx.Graph[str] = nx.Graph(joint.links for joint in mechanism.joints.values())
@@ -42,7 +43,7 @@ def between(mechanism: Mechanism, base: str, platform: str) -> Mechanism:
     for chain in nx.connected_components(beyond):
         if len(chain & own) > 1:
             raise BadRequest(
-                f"{mechanism.name}: gears join joints between {base!r} and {platform!r} through others",
+                f"{mechanism.name}: couplings connect joints between {base!r} and {platform!r} through others",
                 ", ".join(sorted(chain - own)),
                 "a base and a platform with these between them",
             )

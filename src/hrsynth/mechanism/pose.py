@@ -30,20 +30,20 @@ EXAMPLE = "x=0.02,y=0.1,z=-0.7, and phi=10deg or rpy=0.1/0/0"
 
 @dataclass(frozen=True)
 class Pose(Record):
-    """Parts of a platform's pose; None is free. ``phi`` is the turn from the zero configuration about the base frame's
-    z (for a planar robot about the normal of its plane), ``rpy`` URDF's fixed-axis roll, pitch, yaw."""
+    """Parts of a platform's pose; None is free. ``phi`` is the rotation from the zero configuration about the base
+    frame's z (for a planar robot about the normal of its plane), ``rpy`` URDF's fixed-axis roll, pitch, yaw."""
 
     x: Annotated[float | None, "null: free"] = None
     y: Annotated[float | None, "null: free"] = None
     z: Annotated[float | None, "null: free"] = None
-    phi: Annotated[float | None, float, As(optional=True), "there if it was given"] = None
+    phi: Annotated[float | None, float, As(optional=True), "present if it was given"] = None
     rpy: Annotated[tuple[float, float, float] | None, "roll, pitch, yaw about fixed axes"] = None
     shown: str = field(default="", repr=False, compare=False)
-    """How it was typed, or is told where a pose was typed in that manner."""
+    """Text as it was typed, or in the form in which another pose was typed."""
 
     def __post_init__(self) -> None:
         if self.phi is not None and self.rpy is not None:
-            raise BadRequest("a pose has both phi and rpy", str(self), "one of them")
+            raise BadRequest("pose with both phi and rpy", str(self), "one of them")
         for name, values in self.given.items():
             if not all(isinstance(value, int) or math.isfinite(value) for value in values):
                 raise BadRequest(f"pose: {name} is not finite", "/".join(map(str, values)), "a finite number")
@@ -52,7 +52,7 @@ class Pose(Record):
 
     @classmethod
     def parse(cls, text: str) -> Pose:
-        """The pose written as ``x=0.02,y=0.1,z=-0.7,phi=10deg``; raises ``BadRequest``."""
+        """Return the pose written as ``x=0.02,y=0.1,z=-0.7,phi=10deg``. Raises ``BadRequest``."""
         parts = _fields(text, "pose")
         fields: dict[str, Any] = {
             name: _triple(value, text) if name == "rpy" else _number(value, name, text) for name, value in parts
@@ -61,7 +61,7 @@ class Pose(Record):
 
     @classmethod
     def of(cls, X: Array, point: Array | None = None) -> Pose:
-        """The pose of a homogeneous matrix X_BP (4, 4); for a point body only the position of ``point`` (in the
+        """Return the pose of a homogeneous matrix X_BP (4, 4); for a point body only the position of ``point`` (in the
         platform's frame)."""
         x, y, z = map(float, X[:3, 3] if point is None else X[:3, :3] @ point + X[:3, 3])
         if point is not None:
@@ -71,14 +71,14 @@ class Pose(Record):
 
     @property
     def given(self) -> dict[str, tuple[float, ...]]:
-        """The parts that are given, each with its numbers."""
+        """Parts that are given, each with its numbers."""
         parts: dict[str, tuple[float, ...] | None] = {
             name: None if (value := getattr(self, name)) is None else (value,) for name in SCALARS
         }
         return {name: values for name, values in {**parts, "rpy": self.rpy}.items() if values is not None}
 
     def without(self, names: Iterable[str]) -> Pose:
-        """The same pose with these parts free."""
+        """Return the pose with these parts free."""
         gone = set(names) & self.given.keys()
         return Pose(**{name: getattr(self, name) for name in PARTS if name not in gone}) if gone else self
 
@@ -93,14 +93,14 @@ class Pose(Record):
 
 @dataclass(frozen=True)
 class PoseForm:
-    """How a user writes poses that turn about several axes: a turn by ``phi`` if it is one, rpy in ``degrees``."""
+    """Form in which a user writes poses with several rotation axes: ``phi`` for one rotation, rpy in ``degrees``."""
 
     phi: bool = False
     degrees: bool = False
 
     @classmethod
     def of(cls, poses: Iterable[AskedPose]) -> PoseForm:
-        """The form in which these poses are written."""
+        """Return the form in which these poses are written."""
         typed = [each for each in poses if isinstance(each, Pose)]
         return cls(
             any(each.phi is not None or "phi=" in each.shown for each in typed),
@@ -113,7 +113,7 @@ RADIANS = PoseForm()
 
 @dataclass(frozen=True)
 class ModeNumber:
-    """A pose by its number in a list of assembly modes, written ``mode:3``."""
+    """Pose by its number in a list of assembly modes, written ``mode:3``."""
 
     number: int
 
@@ -123,20 +123,20 @@ class ModeNumber:
 
 @dataclass(frozen=True)
 class JointPose:
-    """Coordinates of joints in place of a pose, counted as the file counts them (m, rad): written
-    ``joints:knee=0.3,hip=5deg``, or ``motors:0.1,0.2`` in the order of the file. Motors that are not named stay as they
-    are at the zero configuration; other joints move as the loops ask."""
+    """Pose by coordinates of joints, counted as the file counts them (m, rad): written ``joints:knee=0.3,hip=5deg``, or
+    ``motors:0.1,0.2`` in the order of the file. Motors that are not named stay at the zero configuration; other joints
+    follow the loops."""
 
     motors: bool
     values: tuple[tuple[str, tuple[float, ...]], ...]
-    """By name; without names (empty) in the order of the file."""
+    """Coordinates by name; without names (empty) in the order of the file."""
     degrees: tuple[str, ...] = ()
-    """Names, or numbers in the order of the file, of those that were given in degrees."""
+    """Names, or numbers in the order of the file, of those given in degrees."""
 
     @classmethod
     def of(cls, kind: str, given: Any) -> JointPose:
-        """Those of ``joints`` or ``motors``, given as a text, as a dict by names, or in the order of the file; raises
-        ``BadRequest``."""
+        """Return those of ``joints`` or ``motors``, given as a text, as a dict by names, or in the order of the file.
+        Raises ``BadRequest``."""
         pairs: list[tuple[str, Any]] = []
         if isinstance(given, str):
             parts = [part.rpartition("=") for part in given.split(",")]
@@ -149,7 +149,7 @@ class JointPose:
         if not pairs or ("" in names and len(names) > 1):
             raise BadRequest(f"{kind} of a pose: all by name, or all in the order of the file", given, JOINT_POSES)
         if "" not in names and len(names) < len(pairs):
-            raise BadRequest(f"{kind} of a pose: a name is given twice", given, "each once")
+            raise BadRequest(f"{kind} of a pose: name given twice", given, "each name once")
         read = [(name, *_coordinates(kind, value)) for name, value in pairs]
         return cls(
             kind == "motors",
@@ -168,8 +168,8 @@ class JointPose:
 
 
 def _coordinates(kind: str, given: Any) -> tuple[tuple[float, ...], bool]:
-    """The coordinates of one joint, and whether they are in degrees: numbers in metres or radians, or a text with /
-    between, degrees with ``deg``."""
+    """Return the coordinates of one joint, and True if they are in degrees: numbers in metres or radians, or a text
+    with / between, degrees with ``deg``."""
     try:
         if isinstance(given, str):
             typed = [part.strip() for part in given.split("/")]
@@ -184,7 +184,7 @@ def _coordinates(kind: str, given: Any) -> tuple[tuple[float, ...], bool]:
             return tuple(map(float, numbers)), typed != digits
     except (TypeError, ValueError, OverflowError):
         pass
-    unit = f"metres or radians below {FARTHEST_JOINT:g}, or of degrees with deg"
+    unit = f"metres or radians below {FARTHEST_JOINT:g}, or degrees with deg"
     raise BadRequest(f"{kind} of a pose: not a number of {unit}", given, JOINT_POSES)
 
 
@@ -192,7 +192,7 @@ JOINT_POSES = "joints:NAME=VALUE,… or motors:VALUE,VALUE,… in the order of t
 
 
 class RigidTransform(Protocol):
-    """What has a homogeneous matrix, as ``pinocchio.SE3``."""
+    """Object with a homogeneous matrix, such as ``pinocchio.SE3``."""
 
     @property
     def homogeneous(self) -> Array: ...
@@ -200,8 +200,8 @@ class RigidTransform(Protocol):
 
 AskedPose = Pose | ModeNumber | JointPose
 PoseLike = AskedPose | str | Mapping[str, Any] | ArrayLike | RigidTransform
-"""A pose as a user gives it: a text, a dict of its parts, x y z (roll pitch yaw), a matrix (4, 4), an SE3 of
-Pinocchio; coordinates as ``{"joints": {"knee": 0.3}}`` or ``{"motors": [0.1, 0.2]}``, in the order of the file."""
+"""Pose as a user gives it: a text, a dict of its parts, x y z (roll pitch yaw), a matrix (4, 4), an SE3 of Pinocchio;
+coordinates as ``{"joints": {"knee": 0.3}}`` or ``{"motors": [0.1, 0.2]}``, in the order of the file."""
 POSES = (
     f"a text such as {EXAMPLE}; a dict of these; numbers x, y, z or x, y, z, roll, pitch, yaw; a 4 × 4 matrix; "
     "a pinocchio.SE3"
@@ -209,7 +209,7 @@ POSES = (
 
 
 def as_pose(given: PoseLike) -> Pose:
-    """The pose given in any of the ways of ``PoseLike`` except by the number of a mode; raises ``BadRequest``."""
+    """Return the pose given in any form of ``PoseLike`` except by the number of a mode. Raises ``BadRequest``."""
     if isinstance(given, Pose):
         return given
     if isinstance(given, str):
@@ -231,7 +231,7 @@ def as_pose(given: PoseLike) -> Pose:
             and np.linalg.det(R) > 0
             and np.max(np.abs(numbers[3] - np.eye(4)[3])) < AS_PRINTED
         ):
-            raise BadRequest("a pose: the matrix is not that of a rotation and a translation", numbers.tolist(), POSES)
+            raise BadRequest("pose: not the matrix of a rotation and a translation", numbers.tolist(), POSES)
         return Pose.of(numbers)
     if numbers.shape not in ((3,), (6,)):
         raise BadRequest("a pose", given, POSES)
@@ -240,14 +240,14 @@ def as_pose(given: PoseLike) -> Pose:
 
 
 def _as_text(value: Any) -> str:
-    """A part of a pose as a text says it, to the last digit."""
+    """Return a part of a pose as a text, to the last digit."""
     if isinstance(value, str):
         return value
     return repr(float(value)) if np.ndim(value) == 0 else "/".join(map(_as_text, value))
 
 
 def asked_poses(given: PoseLike | Iterable[PoseLike] | None) -> list[AskedPose]:
-    """The poses that are given, one or several; raises ``BadRequest``."""
+    """Return the given poses, one or several. Raises ``BadRequest``."""
     if given is None:
         return []
     several: Any = given
@@ -265,12 +265,12 @@ def asked_poses(given: PoseLike | Iterable[PoseLike] | None) -> list[AskedPose]:
 
 
 def asked_pose(given: PoseLike) -> AskedPose:
-    """The pose that is given, by its parts, as ``mode:3`` or by coordinates of joints; raises ``BadRequest``."""
+    """Return the given pose, by its parts, as ``mode:3`` or by coordinates of joints. Raises ``BadRequest``."""
     if isinstance(given, ModeNumber | JointPose):
         return given
     if isinstance(given, Mapping) and (kinds := [name for name in ("joints", "motors") if name in given]):
         if len(given) > 1:
-            raise BadRequest(f"a pose by {kinds[0]} and other parts", ", ".join(map(str, given)), "one of them")
+            raise BadRequest(f"pose by {kinds[0]} and other parts", ", ".join(map(str, given)), "one of them")
         return JointPose.of(kinds[0], given[kinds[0]])
     if not isinstance(given, str):
         return as_pose(given)
@@ -279,15 +279,15 @@ def asked_pose(given: PoseLike) -> AskedPose:
         return JointPose.of(name, number)
     if not colon or name != "mode":
         if given.strip().casefold().startswith(("joint", "motor")):
-            raise BadRequest("a pose by joints or motors", given, JOINT_POSES)
+            raise BadRequest("pose by joints or motors", given, JOINT_POSES)
         return Pose.parse(given)
     if not (number.isascii() and number.isdecimal()) or int(number) < 1:
-        raise BadRequest("number of a mode", given, "mode:1, mode:2, … as modes lists them")
+        raise BadRequest("number of a mode", given, "mode:1, mode:2, … as listed by modes")
     return ModeNumber(int(number))
 
 
 class GridValues(TypedDict, total=False):
-    """The values of the parts that vary."""
+    """Values of the parts that vary."""
 
     x: list[float]
     y: list[float]
@@ -296,7 +296,7 @@ class GridValues(TypedDict, total=False):
 
 
 class FixedParts(TypedDict, total=False):
-    """The parts of the pose that a grid holds fixed."""
+    """Parts of the pose that a grid keeps constant."""
 
     x: float
     y: float
@@ -307,15 +307,15 @@ class FixedParts(TypedDict, total=False):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Grid(Value):
-    """A line, plane or box of poses: the parts that vary with their values, over a pose that gives the rest."""
+    """Line, plane or box of poses: the parts that vary with their values, and a pose with the other parts."""
 
     axes: tuple[tuple[str, Array], ...]
     fixed: Pose
 
     @classmethod
     def parse(cls, text: Grid | str, largest: int = LARGEST_GRID) -> Grid:
-        """The grid written as ``x=-0.3:0.3:21,y=0:0.1:5,z=-0.7`` (from:to:count), of at most ``largest`` poses, or one
-        as it is; raises ``BadRequest``."""
+        """Return the grid written as ``x=-0.3:0.3:21,y=0:0.1:5,z=-0.7`` (from:to:count), of at most ``largest`` poses,
+        or a given grid. Raises ``BadRequest``."""
         if isinstance(text, Grid):
             return text
         if not isinstance(text, str):
@@ -346,13 +346,13 @@ class Grid(Value):
     @property
     @recorded(FLAT)
     def values_record(self) -> GridValues:
-        """The values of the parts that vary."""
+        """Values of the parts that vary."""
         return cast(GridValues, dict(self.axes))
 
     @property
     @recorded(As("fixed"))
     def fixed_record(self) -> FixedParts:
-        """The parts of the pose that the grid holds fixed."""
+        """Parts of the pose that the grid keeps constant."""
         parts = {name: values if name == "rpy" else values[0] for name, values in self.fixed.given.items()}
         return cast(FixedParts, parts)
 
@@ -369,7 +369,7 @@ class Grid(Value):
     @property
     @recorded(As("axes"))
     def names(self) -> tuple[str, ...]:
-        """The parts that vary, in order."""
+        """Parts that vary, in order."""
         return tuple(name for name, _ in self.axes)
 
     @property
@@ -378,35 +378,35 @@ class Grid(Value):
         return math.prod(self.shape)
 
     def places(self, start: int = 0, stop: int | None = None) -> Array:
-        """The values of the parts that vary at all cells, or those from ``start`` to before ``stop``, (n, ndim), the
-        last axis running fastest."""
+        """Return the values of the parts that vary at all cells, or those from ``start`` to before ``stop``, (n, ndim),
+        the last axis running fastest."""
         return self.places_at(np.arange(start, self.size if stop is None else min(stop, self.size)))
 
     def places_at(self, cells: NDArray[np.int64]) -> Array:
-        """The values of the parts that vary at cells by their number, (n, ndim)."""
+        """Return the values of the parts that vary at cells by their number, (n, ndim)."""
         on = np.unravel_index(cells, self.shape)
         return np.stack([values[i] for (_, values), i in zip(self.axes, on, strict=True)], axis=1)
 
     def poses(self) -> tuple[Pose, ...]:
-        """The poses of all cells, the last axis running fastest."""
+        """Return the poses of all cells, the last axis running fastest."""
         return self.poses_at(product(*(range(size) for size in self.shape)))
 
     def poses_at(self, cells: Iterable[Sequence[int]]) -> tuple[Pose, ...]:
-        """The poses of cells, each given by its place on every axis."""
+        """Return the poses of cells, each given by its index on every axis."""
         return tuple(
             self.pose([float(values[i]) for (_, values), i in zip(self.axes, cell, strict=True)]) for cell in cells
         )
 
     def pose(self, values: Sequence[float]) -> Pose:
-        """The pose with these values of the parts that vary."""
+        """Return the pose with these values of the parts that vary."""
         given: dict[str, Any] = dict(zip(self.names, values, strict=True))
         return replace(self.fixed, **given)
 
 
 def rpy_of(R: Array) -> tuple[float, float, float]:
-    """Fixed-axis roll, pitch, yaw of a rotation (3, 3); yaw is zero where the pitch is a right angle.
+    """Return fixed-axis roll, pitch, yaw of a rotation (3, 3); yaw is zero if the pitch is a right angle.
 
-    The roll is read after the yaw is turned back, so that the two fit together next to there as well."""
+    The roll is read after the yaw is undone, so that the two agree near a right angle as well."""
     level = math.hypot(R[0, 0], R[1, 0])
     pitch, yaw = math.atan2(-R[2, 0], level), math.atan2(R[1, 0], R[0, 0]) if level > 1e-12 else 0.0
     s, c = math.sin(yaw), math.cos(yaw)
@@ -414,12 +414,12 @@ def rpy_of(R: Array) -> tuple[float, float, float]:
 
 
 def positive_half_turn(angle: float) -> float:
-    """A computed angle; half a turn, which has no sense, is made positive."""
+    """Return an angle; 180 degrees, which has no sense, is made positive."""
     return -angle if abs(angle + math.pi) < HALF_TURN else angle
 
 
 def write_parts(parts: Mapping[str, tuple[float, ...]], degrees: bool = False) -> str:
-    """Parts of a pose in one line, angles in radians or ``degrees``."""
+    """Return parts of a pose in one line, angles in radians or ``degrees``."""
     return ",".join(
         f"{name}={'/'.join(_write_number(round(math.degrees(v), 6)) + 'deg' for v in values)}"
         if degrees and name in ("phi", "rpy")
@@ -429,12 +429,12 @@ def write_parts(parts: Mapping[str, tuple[float, ...]], degrees: bool = False) -
 
 
 def _write_number(value: float) -> str:
-    """Six digits, and six decimals, so that a pose is met again to ``AS_PRINTED`` when it is typed back."""
+    """Return six digits, and six decimals, so that a typed pose is the same to ``AS_PRINTED``."""
     return f"{round(value, 6) + 0.0:.15g}" if abs(value) >= 1 else f"{round(value, 9) + 0.0:.6g}"
 
 
 def _fields(text: str, what: str) -> list[tuple[str, str]]:
-    """Name and value of each part, in order, each name once."""
+    """Return name and value of each part, in order, each name once."""
     found: list[tuple[str, str]] = []
     for part in text.split(","):
         name, equals, value = (piece.strip() for piece in part.partition("="))
@@ -455,7 +455,7 @@ def _number(value: str, name: str, text: str) -> float:
     except ValueError:
         unit = "a number of radians, or of degrees with deg" if name in ("phi", "rpy") else "a number of metres"
         if ":" in value:
-            unit += "; from:to:count is of a grid"
+            unit += "; from:to:count is for grids"
         raise BadRequest(f"pose {text!r}: {name} is not a number", value, unit) from None
     if not math.isfinite(number):
         raise BadRequest(f"pose {text!r}: {name} is not finite", value, "a finite number")

@@ -1,7 +1,6 @@
-"""Screws of joints: the one-freedom joints that a joint is a chain of, the wrenches it transmits, the twists it allows,
-and the constraints of a mechanism on the twists of its links. Numbers may be floats or exact, as in
-:mod:`hrsynth.geometry.screws`.
-"""
+"""Screws of joints: their elementary one-dof joints, the wrenches they transmit, the twists they allow, and the
+constraints of a mechanism on the twists of its links. Numbers may be floats or exact, as in
+:mod:`hrsynth.geometry.screws`."""
 
 from __future__ import annotations
 
@@ -14,14 +13,14 @@ from ..geometry.vectors import Array, Numbers, cross, perpendicular
 from .model import Joint, JointType
 
 Geometry = Callable[[Joint], tuple[Numbers, Sequence[Numbers]]]
-"""The centre and the axes of a joint, in base axes, at the configuration in question."""
+"""Centre and axes of a joint, in base axes, at a configuration."""
 
 
 def elementary(
     kind: JointType, axes: Sequence[Array], across: Callable[[Array], Array] = perpendicular
 ) -> list[tuple[JointType, Array]]:
-    """The one-freedom joints, type and axis, that a joint is a chain of, one a freedom; ``across`` gives the direction
-    in which a planar joint slides first.
+    """Return the one-dof joints, type and axis, of the chain that a joint is, one for each dof; ``across`` gives the
+    direction of the first translation of a planar joint.
 
     ``axes`` are those of the joint in the frame of the first link of the chain, and so are the axes found.
     """
@@ -44,7 +43,7 @@ def elementary(
 
 
 def transmitted_wrenches(kind: JointType, point: Numbers, axes: Sequence[Numbers]) -> list[Numbers]:
-    """The wrenches that a joint transmits, 6 − freedoms of them: what it allows is reciprocal to all of them."""
+    """Return the wrenches that a joint transmits, 6 − dof of them: the allowed twists are reciprocal to all of them."""
     basis = np.eye(3, dtype=point.dtype)
     forces = [force(e, point) for e in basis]
     couples = [couple(e) for e in basis]
@@ -68,7 +67,8 @@ def transmitted_wrenches(kind: JointType, point: Numbers, axes: Sequence[Numbers
 
 
 def allowed_twists(kind: JointType, point: Numbers, axes: Sequence[Numbers]) -> list[Numbers]:
-    """The twists of the successor that a joint allows, one a freedom: reciprocal to all that it transmits."""
+    """Return the twists of the successor that a joint allows, one for each dof: reciprocal to all transmitted
+    wrenches."""
     basis = np.eye(3, dtype=point.dtype)
     match kind:
         case JointType.REVOLUTE | JointType.UNIVERSAL:
@@ -88,9 +88,9 @@ def allowed_twists(kind: JointType, point: Numbers, axes: Sequence[Numbers]) -> 
 
 
 def constraints(joints: Sequence[Joint], place: Mapping[str, int], geometry: Geometry) -> Numbers:
-    """The constraint matrix of joints on the stacked twists of links: A ξ = 0, shape (rows, 6 links).
+    """Return the constraint matrix of joints on the stacked twists of links: A ξ = 0, shape (rows, 6 links).
 
-    ``place`` numbers the links whose twists are unknown; a link that is not in it (the base) rests.
+    ``place`` numbers the links whose twists are unknown; a link that is not in it (the base) is fixed.
     """
     blocks = [np.zeros((0, 6 * len(place)))]
     for joint in joints:

@@ -1,4 +1,4 @@
-"""What can be measured of a mechanism: the direction of a segment of a leg, its line, an encoder on a joint."""
+"""Sensors of a mechanism: the direction of a segment of a leg, its line, an encoder on a joint."""
 
 from __future__ import annotations
 
@@ -22,45 +22,43 @@ from .observations.encoder import AngleEncoder, Encoder, SlideEncoder
 from .observations.line import SpaceLine
 
 Place = TypeVar("Place")
-INSTEAD = "another direction: --sensor direction:LINK/dx,dy,dz (in the link's frame), or <observe> in the file"
-"""What can be watched of a leg that has no segment of its own."""
+INSTEAD = "Observe another direction: --sensor direction:LINK/dx,dy,dz (in the link's frame), or <observe> in the file."
+"""Remedy for a leg without a segment."""
 TURNING = (JointType.REVOLUTE, JointType.CYLINDRICAL)
 
 
 def default_observation(decomposition: LegDecomposition, leg: Leg, last: bool = False) -> Direction:
-    """The default segment of a leg (docs/pages/theory.md, section 2): the axis of a P that joins two moving links;
-    else the last segment before the platform (of equal parallel rods the first) that has a length; with ``last`` the
-    last one, and ``NoSegment`` where it has none."""
+    """Return the default segment of a leg (docs/pages/theory.md, section 2): the axis of a P that connects two moving
+    links; else the last segment before the platform (of equal parallel rods the first) with a length; with ``last`` the
+    last one, and ``NoSegment`` if it has none."""
     return _default(decomposition, leg, last)[0]
 
 
 def _default(decomposition: LegDecomposition, leg: Leg, last: bool = False) -> tuple[Direction, str]:
-    """The default segment of a leg, and why it is that one."""
+    """Return the default segment of a leg, and the reason for it."""
     if decomposition.floats(leg):
-        raise NoSegment(
-            f"leg {leg.label} has no segment to observe: nothing holds the platform", leg.joints[0], INSTEAD
-        )
+        raise NoSegment(f"leg {leg.label}: no segment to observe: the platform is free", leg.joints[0], remedy=INSTEAD)
     segments = _Segments(decomposition, leg, NOISE)
     path, nodes, base = segments.path, segments.nodes, decomposition.mechanism.base
     for i, edge in enumerate(path):
         joint = segments.joint(edge)
         if joint is not None and joint.type is JointType.PRISMATIC and base not in (nodes[i], nodes[i + 1]):
-            return segments.along(nodes[i], joint, i), f"the axis of the slide {joint.name}"
+            return segments.along(nodes[i], joint, i), f"the axis of the prismatic joint {joint.name}"
     if leg.takes_platform:
         return segments.binary(decomposition.mechanism.platform), "the platform is the last segment of this leg"
     if path[-1].inside:
         rod = _first(segments.binary, path[-1].inside)
         return rod, "the first of the parallel rods before the platform"
     if len(nodes) < 3:
-        raise NoSegment(f"leg {leg.label} has no segment to observe: it is one joint", path[-1].joints[0], INSTEAD)
+        raise NoSegment(f"leg {leg.label}: no segment to observe: it is one joint", path[-1].joints[0], remedy=INSTEAD)
     found = _first(segments.at, range(len(nodes) - 2, 0, -1)[: 1 if last else None])
-    short = "" if found.link == nodes[-2] else " that has a length"
+    short = "" if found.link == nodes[-2] else " with a length"
     return found, f"the last segment before the platform{short}"
 
 
 def _first(segment: Callable[[Place], Direction], places: Sequence[Place]) -> Direction:
-    """The first of some segments that has a length: what joins the two R of a U, oblique ones too, has none; raises
-    ``NoSegment`` for the first where none has."""
+    """Return the first of some segments with a length (links between the R of a U have none). Raises ``NoSegment`` for
+    the first if none has."""
     refused: NoSegment | None = None
     for place in places:
         try:
@@ -72,18 +70,18 @@ def _first(segment: Callable[[Place], Direction], places: Sequence[Place]) -> Di
 
 
 def reason(decomposition: LegDecomposition, seen: Observation) -> str:
-    """Why a segment is watched, in words."""
+    """Return the reason why a segment is observed."""
     if any(each.key == seen.key for each in decomposition.mechanism.observations):
-        return "named in the file" if seen.by_segment or seen.line is not None else "asked for"
+        return "named in the file" if seen.by_segment or seen.line is not None else "requested"
     try:
         default, why = _default(decomposition, decomposition.leg(seen.leg))
     except HrsynthError:
-        return "asked for"
-    return why if default.key == seen.key else "asked for"
+        return "requested"
+    return why if default.key == seen.key else "requested"
 
 
 def defaults_of(decomposition: LegDecomposition) -> dict[str, Observation]:
-    """The segment of each leg that has one: the file's choice, else the default one."""
+    """Return the segment of each leg that has one: the file's choice, else the default one."""
     table: dict[str, Observation] = {}
     given = {o.leg: o for o in reversed(decomposition.mechanism.observations) if o.by_segment}
     for leg in decomposition.legs:
@@ -98,11 +96,11 @@ def defaults_of(decomposition: LegDecomposition) -> dict[str, Observation]:
 
 
 def observation_of(decomposition: LegDecomposition, link: str) -> Direction:
-    """The segment direction of any link of a leg: centre to centre, or along the axis of its P."""
+    """Return the segment direction of any link of a leg: centre to centre, or along the axis of its P."""
     leg = decomposition.leg_of(link)
     if leg is None:
         raise BadRequest(
-            f"{decomposition.mechanism.name}: no leg has the link",
+            f"{decomposition.mechanism.name}: link not in a leg",
             link,
             [n for each in decomposition.legs for n in each.links],
         )
@@ -111,10 +109,10 @@ def observation_of(decomposition: LegDecomposition, link: str) -> Direction:
 
 
 class _Segments:
-    """The directions of a leg's segments: links on its ``path``, between ``nodes``."""
+    """Directions of a leg's segments: links on its ``path``, between ``nodes``."""
 
     def __init__(self, decomposition: LegDecomposition, leg: Leg, least: float = SAME_POINT) -> None:
-        """``least`` is the length (characteristic lengths) up to which a segment has none."""
+        """Store the length ``least`` (characteristic lengths) up to which a segment has no direction."""
         self.least = least
         self.mechanism, self.leg, self.path = decomposition.mechanism, leg, decomposition.path(leg)
         self.nodes = [self.mechanism.base]
@@ -122,7 +120,8 @@ class _Segments:
             self.nodes.append(edge.other(self.nodes[-1]))
 
     def at(self, place: int) -> Direction:
-        """That of a node within the path: along the P after or before it, or between the centres of both edges."""
+        """Return that of a node within the path: along the P after or before it, or between the centres of both
+        edges."""
         for i in (place, place - 1):
             joint = self.joint(self.path[i])
             if joint is not None and joint.type.slides:
@@ -133,8 +132,8 @@ class _Segments:
         return self._direction(link, end - start)
 
     def _centre(self, place: int, link: str, beyond: int) -> Joint | Array:
-        """The end of a link at a place of the path; the point where two passive R meet (a U that is oblique or of
-        rounded numbers), where the connector between them has no length. ``beyond`` is the place of the second."""
+        """Return the end of a link at a place of the path; the point where two passive R meet (a U that is oblique or
+        of rounded numbers), if the connector between them has no length. ``beyond`` is the place of the second."""
         end = self._end(self.path[place], link)
         other = self.joint(self.path[beyond]) if 0 <= beyond < len(self.path) else None
         pair = [
@@ -148,13 +147,14 @@ class _Segments:
         return end if meeting is None else meeting
 
     def binary(self, link: str) -> Direction:
-        """That of a binary link: from the joint nearer to the base to the other."""
+        """Return that of a binary link: from the joint nearer to the base to the other."""
         joints = self.mechanism.joints_of(link)
         if len(joints) != 2:
             raise BadRequest(
-                f"link {link!r} of leg {self.leg.label} has {len(joints)} joints: it has no direction of its own",
-                None,
-                "an observe element with an axis",
+                f"link {link!r} of leg {self.leg.label}: no direction of its own; its joints",
+                len(joints),
+                "2",
+                remedy="Give the direction with <observe> and axis.",
             )
         own = {self.mechanism.base, *self.leg.links} - {link, self.mechanism.platform}
         distance = graphs.distances(self.mechanism.adjacency, self.mechanism.base, own)
@@ -166,7 +166,7 @@ class _Segments:
         return self._direction(link, end - start)
 
     def along(self, link: str, joint: Joint, place: int) -> Direction:
-        """That along the axis of the P or C at a place of the path, from the base side to the platform side."""
+        """Return that along the axis of the P or C at a place of the path, from the base side to the platform side."""
         joints, last = self.mechanism.joints, len(self.path) - 1
         before = joints[self.path[place - 1].joints[0]].point if place else joint.point
         after = (
@@ -178,26 +178,27 @@ class _Segments:
         return self._direction(link, -joint.axis if backwards else joint.axis)
 
     def joint(self, edge: WordEdge) -> Joint | None:
-        """The joint that an edge is, if it is one."""
+        """Return the joint that an edge is, if it is one."""
         return self.mechanism.joints[edge.joints[0]] if len(edge.joints) == 1 else None
 
     def _end(self, edge: WordEdge, link: str) -> Joint | Array:
-        """The joint that the edge is, or the mean of the centres of its joints on a link."""
+        """Return the joint that the edge is, or the mean of the centres of its joints on a link."""
         joints = self.mechanism.joints
         return self.joint(edge) or np.mean([joints[n].point for n in edge.joints if link in joints[n].links], axis=0)
 
     def _direction(self, link: str, vector: Array) -> Direction:
         if np.linalg.norm(vector) <= self.least * self.mechanism.length:
             raise NoSegment(
-                f"the observed segment {link!r} of leg {self.leg.label} has no length",
+                f"leg {self.leg.label}: length of the observed segment {link!r}",
                 float(np.linalg.norm(vector)),
-                f"two joint centres apart from each other; {INSTEAD}",
+                "two different joint centres",
+                remedy=INSTEAD,
             )
         return Direction(self.leg.label, link, self.mechanism.links[link].pose[:3, :3].T @ unit(vector))
 
 
 def _foot(of: Joint | Array, seen_from: Joint | Array) -> Array:
-    """A centre; of an R the foot, on its axis, of the perpendicular from the other."""
+    """Return a centre; of an R the point of its axis nearest to the other."""
     if not isinstance(of, Joint):
         return of
     if of.type is not JointType.REVOLUTE:
@@ -206,7 +207,8 @@ def _foot(of: Joint | Array, seen_from: Joint | Array) -> Array:
 
 
 def encoders(mechanism: Mechanism, joint: Joint, leg: str = "") -> tuple[Encoder, ...]:
-    """An encoder for each coordinate of an R, P, C (slide, turn) or U (first, second axis); none for other types."""
+    """Return an encoder for each coordinate of an R, P, C (translation, rotation) or U (first, second axis); none for
+    other types."""
     if joint.type is JointType.UNIVERSAL:
         return tuple(_angle(mechanism, each, leg, each.axes[1]) for each in (joint, joint.turned()))
     found: list[Encoder] = []
@@ -218,7 +220,8 @@ def encoders(mechanism: Mechanism, joint: Joint, leg: str = "") -> tuple[Encoder
 
 
 def _angle(mechanism: Mechanism, joint: Joint, leg: str, mark: Array) -> AngleEncoder:
-    """The turn about the first axis, fixed in the predecessor, of a direction ``mark`` fixed in the successor."""
+    """Return the encoder of the angle about the first axis, fixed in the predecessor, of a direction ``mark`` fixed in
+    the successor."""
     before, after = (mechanism.links[link].pose[:3, :3].T for link in joint.links)
     return AngleEncoder(
         leg,
@@ -245,8 +248,8 @@ def _slide(mechanism: Mechanism, joint: Joint, leg: str) -> SlideEncoder:
 
 
 def observed_line(decomposition: LegDecomposition, seen: Direction) -> SpaceLine:
-    """The line whose direction is ``seen``: the one through the segment's first centre (that of a joint that does not
-    slide, where there is one; docs/pages/theory.md, section 2)."""
+    """Return the line whose direction is ``seen``: the one through the segment's first centre (that of a joint that
+    does not translate, if there is one; docs/pages/theory.md, section 2)."""
     mechanism = decomposition.mechanism
     link = mechanism.links[seen.link]
     joints = sorted(mechanism.joints_of(seen.link), key=lambda joint: joint.type.slides)

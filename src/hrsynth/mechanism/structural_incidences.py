@@ -1,9 +1,9 @@
-"""Which relations of a mechanism's geometry hold by the file: what is fixed in one link stays, and joints carry it on.
+"""Structural incidences: those that links and joints alone make hold.
 
 A direction is fixed in a link; an R, a C or an E carries that of its axis to its other link, a P every direction, a U
 each of its axes to its cross. A centre is fixed in the links of its joint, and a point on the axis of an R in both of
-them. Heights along a direction pass an R or E about it and a P normal to it. A relation between what shares a link in
-this sense holds wherever the links go, in every operation mode; other relations may follow from closed loops.
+them. Heights along a direction pass an R or E about it and a P normal to it. Incidences between
+geometry of one link in this sense hold in all configurations and operation modes; others may follow from closed loops.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ RIGID = (JointType.PRISMATIC, JointType.FIXED)
 
 @dataclass(frozen=True)
 class GeometricIncidence:
-    """One relation: two directions of a class, fixed in ``links``, are the ``same``; classes are ``square`` or in a
+    """Incidence: two directions of a class, fixed in ``links``, are the ``same``; classes are ``square`` or in a
     ``plane``; an incidence of the centres in ``terms`` (number, sign); a direction ``seen`` that is fixed in a link."""
 
     kind: Kind
@@ -37,7 +37,7 @@ class GeometricIncidence:
     sight: DirectionSource | None = None
 
     def words(self, relations: Incidences) -> str:
-        """The relation in words."""
+        """Return the incidence as a text."""
         axes = " and ".join(relations.members(c) for c in self.classes)
         names = {number: name for name, number in relations.centres.items()}
         points = "centres of " + ", ".join(names.get(number, "a further point") for number, _ in self.terms)
@@ -52,7 +52,7 @@ class GeometricIncidence:
             case "zero":
                 return f"{points}: {'one point' if pair else 'a parallelogram'}"
             case "parallel":
-                return f"{points}: {'on a line' if pair else 'a parallelogram except for slides'} along {axes}"
+                return f"{points}: {'on a line' if pair else 'a parallelogram except for translations'} along {axes}"
             case "normal":
                 return f"{points}: in a plane normal to {axes}"
             case _:
@@ -60,7 +60,7 @@ class GeometricIncidence:
 
 
 def ties(relations: Incidences) -> tuple[GeometricIncidence, ...]:
-    """All relations, one by one."""
+    """Return all incidences, one by one."""
     found = [
         GeometricIncidence("same", (c,), links=(links[0], link))
         for c, links in enumerate(relations.fixed)
@@ -79,13 +79,13 @@ def ties(relations: Incidences) -> tuple[GeometricIncidence, ...]:
 
 
 def carried_by_joints(mechanism: Mechanism, relations: Incidences, every: Iterable[GeometricIncidence]) -> list[bool]:
-    """Which of the relations hold by the file."""
+    """Return the structural ones among the incidences."""
     known = _Carried(mechanism, relations)
     return [known.holds(tie) for tie in every]
 
 
 class _Carried:
-    """Where directions and centres are fixed: links, and the crosses of U joints."""
+    """Directions and centres with the links in which they are fixed, and the crosses of U joints."""
 
     def __init__(self, mechanism: Mechanism, relations: Incidences) -> None:
         self.joints = list(mechanism.joints.values())
@@ -98,16 +98,16 @@ class _Carried:
         }
         number = len(relations.tower)
         self.groups = [self._joined_links(self._carriers(c)) for c in range(number)]
-        """For each class the groups of links in which one direction of it is fixed or would be."""
+        """Groups of links in which one direction of each class is fixed or would be."""
         self.at_axis = [
             self._reach(groups, set(links)) for groups, links in zip(self.groups, relations.fixed, strict=True)
         ]
-        """For each class where its directions are fixed."""
+        """Links in which the directions of each class are fixed."""
         self.whole = [
             all(link in groups.get(links[0], links[:1]) for link in links)
             for groups, links in zip(self.groups, relations.fixed, strict=True)
         ]
-        """Whether all directions of a class are parallel by the file: else what holds for one may not for another."""
+        """All directions of a class are parallel by structure; else the directions are tested one by one."""
         slides = [
             [
                 joint.links
@@ -120,7 +120,7 @@ class _Carried:
         self.slides = [self._joined_links(pairs) for pairs in slides]
         self.levels = [self._joined_links([j.links for j in self.joints if self._level(j, c)]) for c in range(number)]
         self.at = [{host} for host in relations.hosts]
-        """Where each centre is fixed."""
+        """Links in which each centre is fixed."""
         for joint in self.joints:
             if joint.name in relations.centres and joint.type is not JointType.CYLINDRICAL:
                 self.at[relations.centres[joint.name]] |= {*joint.links, _cross(joint)}
@@ -128,12 +128,12 @@ class _Carried:
 
     @staticmethod
     def _joined_links(pairs: Iterable[tuple[str, str]]) -> dict[str, frozenset[str]]:
-        """For each link that is joined to others, all that it is joined to."""
+        """Return all links joined to each link."""
         parts = (frozenset(part) for part in graphs.components(graphs.adjacency((), pairs)))
         return {link: part for part in parts for link in part}
 
     def _carriers(self, c: int) -> list[tuple[str, str]]:
-        """Pairs of links between which a direction of class c is carried."""
+        """Return pairs of links between which a direction of class c is carried."""
         pairs = []
         for joint in self.joints:
             if joint.type in RIGID or (joint.type in TURNING and self.axes[joint.name] == (c,)):
@@ -151,13 +151,13 @@ class _Carried:
         return links.union(*(groups.get(link, ()) for link in links))
 
     def _level(self, joint: Joint, c: int) -> bool:
-        """Whether a joint keeps heights along class c."""
+        """Return True if a joint keeps heights along class c."""
         if joint.type is JointType.PRISMATIC:
             return self._is_square(c, *self.axes[joint.name])
         return joint.type is JointType.FIXED or (joint.type in LEVEL and self.axes[joint.name] == (c,))
 
     def _is_square(self, a: int, b: int) -> bool:
-        """Whether two classes are perpendicular by the file."""
+        """Return True if two classes are perpendicular by structure."""
         return (
             frozenset((a, b)) in self.square
             and self.whole[a]
@@ -166,7 +166,7 @@ class _Carried:
         )
 
     def _spread(self, relations: Incidences) -> None:
-        """A point on the axis of an R that is fixed in one of its links is fixed in the other."""
+        """Add that a point on the axis of an R that is fixed in one of its links is fixed in the other."""
         on = [
             (number, joint.links)
             for each in relations.incidences
@@ -184,7 +184,7 @@ class _Carried:
                     self.at[number] |= set(links)
 
     def holds(self, tie: GeometricIncidence) -> bool:
-        """Whether a relation holds by the file."""
+        """Return True if an incidence is structural."""
         if tie.kind == "same":
             first, other = tie.links
             return other in self.groups[tie.classes[0]].get(first, ())
@@ -216,7 +216,7 @@ class _Carried:
         )
 
     def _is_seen(self, tie: GeometricIncidence) -> bool:
-        """Whether all that makes an observed direction is fixed in its link."""
+        """Return True if all sources of an observed direction are fixed in its link."""
         assert tie.sight is not None
         (link,) = tie.links
         return all(link in self.at[number] for number in tie.sight.points) and all(
@@ -225,5 +225,5 @@ class _Carried:
 
 
 def _cross(joint: Joint) -> str:
-    """The name of a U joint's cross among those of links: none is called so."""
+    """Return the name of a U joint's cross among those of links: no link has it."""
     return f"\0{joint.name}"

@@ -1,8 +1,9 @@
-"""What turns about axes through one point can do: the angle between the first and the last axis stays in an interval.
+"""Tilt limit of rotations about axes through one point: the angle between the first and the last axis stays in an
+interval.
 
-Turns about a₁ … aₙ, neighbours γᵢ apart, make R = R₁ … Rₙ. As R₁ and Rₙ are free, all that limits R is the angle of a₁
-and R aₙ: the distance of the ends of a chain of great arcs γᵢ on the unit sphere. It runs over all of [0, π] for three
-axes only where neighbours are perpendicular.
+Rotations about a₁ … aₙ, with angles γᵢ between neighbours, make R = R₁ … Rₙ. As R₁ and Rₙ are free, R is limited by the
+angle of a₁ and R aₙ alone: the distance of the ends of a chain of great arcs γᵢ on the unit sphere. It takes all values
+of [0, π] for three axes only if neighbours are perpendicular.
 """
 
 from __future__ import annotations
@@ -20,10 +21,10 @@ Interval = tuple[float, float]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TiltLimit(Value):
-    """A spherical joint that stands for turns about axes through its centre: the ``first``, fixed in the predecessor,
-    and the ``last``, fixed in the successor, unit vectors at the zero configuration, are ``low`` to ``high`` (rad)
-    apart. Where ``count`` axes are three, they lie in a plane at an end of the interval, and the turns lose a freedom;
-    of more axes, only at an end that limits them."""
+    """Tilt limit of a spherical joint that stands for rotations about axes through its centre: the angle of the
+    ``first``, fixed in the predecessor, and the ``last``, fixed in the successor, unit vectors at the zero
+    configuration, is between ``low`` and ``high`` (rad). If ``count`` is three, the axes lie in a plane at an end of
+    the interval, and the rotations lose a dof; with more axes, only at an end that limits them."""
 
     first: Array
     last: Array
@@ -33,50 +34,50 @@ class TiltLimit(Value):
 
     @classmethod
     def of(cls, first: Array, last: Array, interval: Interval, count: int) -> TiltLimit | None:
-        """None where every turn can be made, and in three ways at all of them."""
+        """Return the tilt limit; None if every rotation can be made, with three dof at all of them."""
         wrist = cls(first, last, *interval, count)
         return wrist if wrist.limits or count == 3 else None
 
     @property
     def limits(self) -> bool:
-        """Whether there are turns that cannot be made."""
+        """There are rotations that cannot be made."""
         return self.lower is not None or self.upper is not None
 
     @property
     def lower(self) -> float | None:
-        """The lower end (rad), where it limits anything."""
+        """Lower end (rad), if it limits anything."""
         return self.low if self.low > SAME_DIRECTION else None
 
     @property
     def upper(self) -> float | None:
-        """The upper end (rad), where it limits anything."""
+        """Upper end (rad), if it limits anything."""
         return self.high if self.high < np.pi - SAME_DIRECTION else None
 
     def turned(self) -> TiltLimit:
-        """The same with predecessor and successor exchanged."""
+        """Return the tilt limit with predecessor and successor exchanged."""
         return TiltLimit(self.last, self.first, self.low, self.high, self.count)
 
     def carried(self, predecessor: Array, successor: Array) -> TiltLimit:
-        """With its axes where two links turned by these (3, 3) carry them."""
+        """Return the tilt limit with its axes carried by two links rotated by these (3, 3)."""
         return TiltLimit(predecessor @ self.first, successor @ self.last, self.low, self.high, self.count)
 
     def margin(self) -> float:
-        """How far the angle is from the nearer end (rad); negative beyond it."""
+        """Return the distance of the angle from the nearer end (rad); negative outside."""
         angle = angle_between(self.first, self.last)
         return min(
             np.inf if self.lower is None else angle - self.lower, np.inf if self.upper is None else self.upper - angle
         )
 
     def flatness(self) -> float:
-        """How far the angle is from the nearer end at which the axes lie in a plane (rad)."""
+        """Return the distance of the angle from the nearer end at which the axes lie in a plane (rad)."""
         angle = angle_between(self.first, self.last)
         ends = (self.low, self.high) if self.count == 3 else (self.lower, self.upper)
         return min((abs(angle - end) for end in ends if end is not None), default=np.inf)
 
 
 def chain_arcs(one: Interval, gap: float, other: Interval) -> Interval:
-    """Distances of the ends of three arcs on the unit sphere, end to end: one of a length in ``one``, ``gap``, one of a
-    length in ``other``; two sides leave |a − b| ≤ c ≤ π − |π − a − b| to the third."""
+    """Return the distances of the ends of three arcs on the unit sphere, end to end: one of a length in ``one``,
+    ``gap``, one of a length in ``other``; two sides leave |a − b| ≤ c ≤ π − |π − a − b| to the third."""
     return _third(_third(one, (gap, gap)), other)
 
 

@@ -63,7 +63,7 @@ def test_a_robot_without_a_loop_is_told_to_have_none(tmp_path: Path):
     path = tmp_path / "robot.urdf"
     path.write_text(urdf(FRAMES))
     (told,) = [note.text for note in load(path, platform="bar").notes if note.kind == "open"]
-    assert "nothing in the file closes a loop" in told
+    assert "no element of the file closes a loop" in told
     assert "--close hook:eye" in told
     with pytest.raises(BadRequest, match=r"closes a loop.*--close hook:eye"):
         observe(load(path))

@@ -82,7 +82,7 @@ def test_what_no_assembly_allows_is_not_mended(tmp_path: Path):
     path.write_text(text[:place] + 'lower="1.5" upper="1.7"' + text[text.index(" effort", place) :])
     assert not includes_zero(load(path, platform="rod"))
     before = path.read_text()
-    assert not hrsynth.lint(path, platform="rod", fix=True).mended
+    assert not hrsynth.lint(path, platform="rod", fix=True).fixed
     assert path.read_text() == before
 
 

@@ -111,7 +111,7 @@ def test_a_bushing_is_the_joint_that_its_stiffness_leaves(torque: str, tmp_path:
     else:
         robot = load(path)
         assert is_the_four_bar(robot)
-    assert any(f"read as a {STIFF[torque].name.lower()} joint" in each for each in notes(robot, "guess"))
+    assert any(f"read as a {STIFF[torque].name.lower()} joint" in each for each in notes(robot, "assumption"))
 
 
 def test_a_bushing_that_is_no_joint_of_loops_is_told(tmp_path: Path):
@@ -152,7 +152,7 @@ def test_a_detachable_joint_of_gazebo_holds_links_as_they_lie(model: str, tmp_pa
         text = text.replace(PIN, PIN + eye).replace(">bar<", ">eye<")
         robot = read(tmp_path, text)
     assert is_the_four_bar(robot)
-    assert any("detachable joint" in each for each in notes(robot, "guess"))
+    assert any("detachable joint" in each for each in notes(robot, "assumption"))
 
 
 @pytest.mark.parametrize("model", ["four_bar", "__model__"])
@@ -175,7 +175,7 @@ def test_detachable_joints_to_another_model_and_attachers_are_told(tmp_path: Pat
     assert any("'handle' of the model 'cup'" in each for each in notes(read(tmp_path, text, "sdf"), "ignored"))
     attacher = '<plugin name="links" filename="libgazebo_ros_link_attacher.so"/>'
     robot = read(tmp_path, urdf(f"<gazebo>{attacher}</gazebo>"), platform="bar")
-    assert any("does not say which: --close A:B:TYPE" in each for each in notes(robot, "open"))
+    assert any("does not name them: use --close A:B:TYPE" in each for each in notes(robot, "open"))
     for title in ('name="holder" filename="libholder.so"', ""):  # a plugin may have lost its name
         named = f"<plugin {title}><link_1>rocker</link_1><link_2>bar</link_2></plugin>"
         robot = read(tmp_path, urdf(f"<gazebo>{named}</gazebo>"), platform="bar")
@@ -197,7 +197,7 @@ def test_paired_frames_of_any_spelling_close_loops(pair: tuple[str, str], tmp_pa
     robot = read(tmp_path, frames(*pair))
     assert is_the_four_bar(robot)
     if not pair[0].startswith("closing"):
-        assert any(f"{pair[0]}:{pair[1]}:spherical" in each for each in notes(robot, "guess"))
+        assert any(f"{pair[0]}:{pair[1]}:spherical" in each for each in notes(robot, "assumption"))
     sites = MJCF["sites"].replace('<connect name="d" site1="s" site2="t"/>', "")
     assert is_the_four_bar(read(tmp_path, sites.replace('"s"', f'"{pair[0]}"').replace('"t"', f'"{pair[1]}"'), "xml"))
 
@@ -241,12 +241,12 @@ def test_a_yaml_file_of_another_name_gives_the_closures(tmp_path: Path):
     (tmp_path / "closures.yaml").write_text(yaml)
     robot = read(tmp_path, text)
     assert is_the_four_bar(robot)
-    assert any("closures.yaml" in each for each in notes(robot, "guess"))
+    assert any("closures.yaml" in each for each in notes(robot, "assumption"))
     assert is_the_four_bar(load(tmp_path / "closures.yaml"))
     (tmp_path / "unlike.yaml").write_text(yaml.replace("one", "none"))
     assert is_the_four_bar(load(tmp_path / "robot.urdf"))
     (tmp_path / "more.yml").write_text(yaml)
-    with pytest.raises(BadRobotFile, match=r"2 YAML files next to it close its loops.*closures.yaml, more.yml"):
+    with pytest.raises(BadRobotFile, match=r"several YAML files next to it close its loops.*closures.yaml, more.yml"):
         load(tmp_path / "robot.urdf")
     (tmp_path / "robot.yaml").write_text(yaml)
     assert is_the_four_bar(load(tmp_path / "robot.urdf"))
@@ -269,7 +269,7 @@ def test_a_world_that_nobody_declares_is_the_ground(tmp_path: Path):
     robot = read(tmp_path, text)
     assert is_the_four_bar(robot)
     assert robot.base == "world"
-    assert any("'world' is declared" in each for each in notes(robot, "guess"))
+    assert any("'world' is declared" in each for each in notes(robot, "assumption"))
 
 
 def test_hyphens_in_comments_and_undeclared_prefixes_are_told_and_read(tmp_path: Path):
@@ -374,10 +374,10 @@ def test_a_point_at_the_centre_stays_a_point(tmp_path: Path):
 def test_a_point_that_is_not_active_is_told_with_what_would_close_it(tmp_path: Path):
     off = MJCF["connect"].replace('<connect name="d"', '<connect name="d" active="false"')
     (told,) = notes(read(tmp_path, off, "xml", platform="bar"), "ignored")
-    wish = told.partition("--close ")[2].partition(" to close")[0]
+    wish = told.partition("--close ")[2].partition(" closes it")[0]
     assert is_the_four_bar(read(tmp_path, off, "xml", close=wish))
     unknown = off.replace('body2="bar"', 'body2="none"')
-    assert notes(read(tmp_path, unknown, "xml", platform="bar"), "ignored") == ["the equality 'd', which is not active"]
+    assert notes(read(tmp_path, unknown, "xml", platform="bar"), "ignored") == ["the inactive equality 'd'"]
 
 
 def test_a_free_joint_is_no_bar(tmp_path: Path):
@@ -385,7 +385,7 @@ def test_a_free_joint_is_no_bar(tmp_path: Path):
     robot = read(tmp_path, text, "xml")
     assert is_the_four_bar(robot)
     assert robot.base == "base"
-    assert any("'base' floats" in each for each in notes(robot, "guess"))
+    assert any("'base' floats" in each for each in notes(robot, "assumption"))
     kept = read(tmp_path, text, "xml", base="world", platform="bar")
     assert kept.base == "world"
 
@@ -456,7 +456,7 @@ def test_shapes_are_scaled_with_the_lengths(tmp_path: Path):
     assert 'xyz="0.005 0 0"' in inertial
     assert 'value="2"' in inertial
     assert 'ixx="7"' in inertial
-    assert any("inertias are taken as they are written" in each for each in notes(robot, "open"))
+    assert any("masses and inertias are not scaled" in each for each in notes(robot, "open"))
 
 
 def test_what_was_read_is_written_and_read_back(tmp_path: Path):

@@ -55,7 +55,7 @@ def test_every_dialect_says_the_same_four_bar(name: str, tmp_path: Path):
 @pytest.mark.parametrize("name", FILES)
 def test_what_was_guessed_is_told(name: str, tmp_path: Path):
     path = written(tmp_path, FILES[name])
-    assert any(note.kind == "guess" and "platform" in note.text for note in load(path).notes)
+    assert any(note.kind == "assumption" and "platform" in note.text for note in load(path).notes)
     given = load(path, platform="bar")
     assert given.platform == "bar"
     assert not any("platform" in note.text for note in given.notes)

@@ -75,7 +75,7 @@ def test_the_foot_that_two_rods_drive_is_the_platform(tmp_path: Path, names: tup
     found = read(tmp_path, ankle(names[2], names[:2], kind))
     assert found.platform == names[2]
     assert found.choice is not None
-    assert found.choice.chosen == "guess"
+    assert found.choice.chosen == "assumption"
 
 
 def test_a_name_that_contradicts_the_structure_is_asked_about(tmp_path: Path):
@@ -168,7 +168,7 @@ def bar(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize(("given", "chosen"), [((), "guess"), (("--platform", "bar"), "option"), (None, "file")])
+@pytest.mark.parametrize(("given", "chosen"), [((), "assumption"), (("--platform", "bar"), "option"), (None, "file")])
 def test_every_answer_names_the_platform_and_what_chose_it(
     bar: Path, given: tuple[str, ...] | None, chosen: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ):
@@ -182,18 +182,18 @@ def test_every_answer_names_the_platform_and_what_chose_it(
         out, err = capsys.readouterr()
         said = json.loads(out)["platform"]
         assert (said["link"], said["chosen"]) == ("bar", chosen)
-        assert ("guess: the platform is link 'bar'" in err) is (chosen == "guess")
+        assert ("assumption: the platform is link 'bar'" in err) is (chosen == "assumption")
         assert "Warning" not in err
         assert execute([command[0], *robot, *command[1:]]) == 0
-        words = ("a guess: " if chosen == "guess" else "") + said["reason"]
+        words = ("assumed: " if chosen == "assumption" else "") + said["reason"]
         assert f"bar ({words})" in capsys.readouterr().out
 
 
 def test_a_guess_is_a_warning_in_python_at_the_line_that_asks(bar: Path):
-    with pytest.warns(AssumedPlatform, match="the platform is link 'bar', a guess: the farthest") as caught:
+    with pytest.warns(AssumedPlatform, match="the platform is link 'bar', assumed: the farthest") as caught:
         found = hrsynth.check(bar)
     assert [each.filename for each in caught] == [__file__]
-    assert "platform: bar (a guess: the farthest from the base)" in hrsynth.text(found)
+    assert "platform: bar (assumed: the farthest from the base)" in hrsynth.text(found)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         hrsynth.load(bar, platform="bar")

@@ -168,7 +168,7 @@ def test_rounded_directions_of_observe_are_those_of_segments(tmp_path: Path):
         ends = [joint.point for joint in balls.joints_of(one.link)]
         rod = found.links[one.link].pose[:3, :3].T @ unit(ends[1] - ends[0])
         assert abs(one.direction @ rod) == pytest.approx(1.0, abs=1e-15)
-    assert {each.rule for each in hrsynth.lint(path, fix=True).mended} == {"geometry-rounded"}
+    assert {each.rule for each in hrsynth.lint(path, fix=True).fixed} == {"geometry-rounded"}
     assert not load(path).notes
 
 

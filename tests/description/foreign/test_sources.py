@@ -262,8 +262,8 @@ def test_a_defect_of_an_included_file_is_told_with_that_file(tmp_path: Path):
         f"{tmp_path / 'parts.xml'}:3: connect of an unknown body: got nix"
     )
     line = refused(written(tmp_path, {"robot.xml": main.format("none.xml")}))
-    assert line.startswith(f"{tmp_path / 'robot.xml'}:2: an include of what is no such file: got none.xml")
+    assert line.startswith(f"{tmp_path / 'robot.xml'}:2: <include>: no such file: got none.xml")
     (tmp_path / "parts.xml").write_text("<mujocoinclude>\n<include file='none.xml'/></mujocoinclude>")
     assert refused(written(tmp_path, {"robot.xml": main.format("parts.xml")})).startswith(
-        f"{tmp_path / 'parts.xml'}:2: an include of what is no such file"
+        f"{tmp_path / 'parts.xml'}:2: <include>: no such file"
     )

@@ -62,7 +62,7 @@ def test_a_flat_zero_pose_is_left_and_said(tmp_path: Path):
     )
     robot = read(tmp_path, flat)
     assert mobility(robot) == 1
-    assert any("singular (its loops have 2 freedoms there, 1 nearby)" in note.text for note in robot.notes)
+    assert any("singular (its loops have mobility 2 there, 1 nearby)" in note.text for note in robot.notes)
 
 
 def test_a_collinear_zero_pose_that_is_open_is_pushed_and_solved(tmp_path: Path):
@@ -76,7 +76,7 @@ def test_a_collinear_zero_pose_that_is_open_is_pushed_and_solved(tmp_path: Path)
     robot = read(tmp_path, bars(lengths, revolute("three", 0.3, "five", 0.5)))
     assert mobility(robot) == 3
     (solved,) = [note.text for note in robot.notes if note.kind == "solved"]
-    assert "after a random push out of a flat pose" in solved
+    assert "after a random push out of a flat configuration" in solved
     assert "p = " in solved
 
 
@@ -118,7 +118,7 @@ def test_an_overconstrained_loop_with_rounded_numbers_is_read_as_it_is_meant(siz
     axes = np.array([joint.axis for joint in robot.joints.values()])
     assert np.max(np.abs(np.cross(axes, axes[0]))) < 1e-12
     if size > 1e-8:
-        assert any("singular values as written leave a gap of" in note.text for note in robot.notes)
+        assert any("rank gap of the loops as written" in note.text for note in robot.notes)
 
 
 @pytest.mark.some(1)
@@ -172,7 +172,7 @@ def test_a_gear_that_would_hold_its_joint_is_refused_and_the_joint_frozen(tmp_pa
     text = bars([("p", "one", "base", origin(0)), ("q", "two", "one", origin(1))], "").replace(
         '<child link="two"/>', '<child link="two"/><mimic joint="p" multiplier="0"/>'
     )
-    told = r"urdf:\d+: coupling 'mimic_q', which would hold joint 'q': got 0.0, .*freeze q"
+    told = r"urdf:\d+: coupling 'mimic_q' would fix joint 'q'; its ratio: got 0.0, .*freeze q"
     with pytest.raises(BadMechanism, match=told):
         read(tmp_path, text, platform="two")
     assert full_mobility(read(tmp_path, text, platform="two", freeze=["q"])) == 1
@@ -185,7 +185,7 @@ def test_a_frozen_joint_holds_those_that_gears_join_to_it(tmp_path: Path):
     assert full_mobility(held) == 1
     assert [joint.name for joint in held.joints.values() if joint.type is not JointType.FIXED] == ["r"]
     away = geared.replace('multiplier="-2"', 'multiplier="-2" offset="0.5"')
-    with pytest.raises(BadRequest, match="--freeze: joint 'p' at zero, and with it 'q' away from zero by the gear"):
+    with pytest.raises(BadRequest, match=r"--freeze p: the coupling .* moves joint 'q' away from zero"):
         read(tmp_path, away, platform="tip", freeze=["p"])
 
 
@@ -296,7 +296,7 @@ def test_efforts_of_zero_tell_the_motors_and_others_tell_nothing(tmp_path: Path)
     mixed = efforts.replace("</xyz></axis>", "</xyz><limit><effort>0</effort></limit></axis>")
     robot = read(tmp_path, mixed, "sdf")
     assert {name for name, joint in robot.joints.items() if joint.actuated} == {"a"}
-    assert any(note.kind == "guess" and "motors" in note.text for note in robot.notes)
+    assert any(note.kind == "assumption" and "motors" in note.text for note in robot.notes)
 
 
 @pytest.mark.parametrize("R", ["xyz", "XYZ", "zyx"])
@@ -374,7 +374,7 @@ def test_equalities_that_are_off_or_hold_a_joint(tmp_path: Path):
 def test_actuators_on_passive_joints_are_told(tmp_path: Path):
     everywhere = MJCF["connect"].replace("</actuator>", '<position joint="b"/><position joint="c"/></actuator>')
     notes = [str(note) for note in read(tmp_path, everywhere, "xml").notes]
-    assert any(note.startswith("open: 3 coordinates are driven, but there are 1 freedoms") for note in notes)
+    assert any(note.startswith("open: 3 coordinates have motors, but the mobility is 1") for note in notes)
     robot = read(tmp_path, everywhere, "xml", motors=["a"])
     assert not any(note.kind == "open" for note in robot.notes)
     assert not any(note.kind == "open" for note in read(tmp_path, MJCF["connect"], "xml").notes)
@@ -520,4 +520,4 @@ def test_the_free_joint_of_a_platform_is_no_way_to_the_base(tmp_path: Path):
         "xml",
     )
     assert robot.platform == "plate"
-    assert "the platform is link 'plate', which 3 ways connect to the base" in "".join(map(str, robot.notes))
+    assert "the platform is link 'plate', which 3 paths connect to the base" in "".join(map(str, robot.notes))

@@ -144,7 +144,10 @@ def test_which_limits_mjcf_loses_is_told_apart(tmp_path: Path):
     text = FOUR_BAR.replace('<axis xyz="0 1 0"/>\n  </loop>', bound)
     (tmp_path / "robot.urdf").write_text(text)
     lost = [note.text for note in save(load(tmp_path / "robot.urdf"), tmp_path / "out.xml")]
-    assert lost == ["limits of closures are not written: d", "limits of velocity and effort are not written: a"]
+    assert lost == [
+        "limits of closures are not written: d",
+        "limits of velocity and force or torque are not written: a",
+    ]
     limits = load(tmp_path / "out.xml", as_written=True).joints["a"].limits
     assert limits is not None
     assert (limits.lower, limits.upper) == (-1.0, 1.0)

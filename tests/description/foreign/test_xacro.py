@@ -103,8 +103,8 @@ def test_expressions_alone_are_expanded(tmp_path: Path):
 @pytest.mark.parametrize(
     ("old", "new", "place", "words"),
     [
-        ('parent link="base"', 'parent link="bass"', '<joint name="shoulder', "unknown link, found bass"),
-        ('xyz="${x} 0 0"', 'xyz="${x} 0"', 'xyz="${x} 0"', "allowed: 3 numbers"),
+        ('parent link="base"', 'parent link="bass"', '<joint name="shoulder', "unknown link: got bass"),
+        ('xyz="${x} 0 0"', 'xyz="${x} 0"', 'xyz="${x} 0"', "expected 3 numbers"),
         ('xyz="${1.5', 'xyz="a ${1.5', "<predecessor", "finite numbers"),
         ("${x / 2}", "${x / nothing}", "x / nothing", "name 'nothing' is not defined"),
         ("sqrt(0.36)", "sqrt(0.36", "<predecessor", "'(' was never closed"),

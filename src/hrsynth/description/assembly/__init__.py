@@ -1,1 +1,1 @@
-"""What foreign files leave to do: guesses, loops closed, closures and rounded geometry read as they are meant."""
+"""Assembly of foreign files: assumptions, loop closures, geometry repair."""

@@ -1,5 +1,5 @@
-"""What a file leaves open, guessed where it hints at one choice only: the base and the platform, by structure, then by
-names of feet and tools. A sensor is never the platform, nor a rod that a name or two ball joints tell."""
+"""Base and platform that a file does not name, assumed by structure, then by names such as those of tools, if there is
+one choice only. A sensor is never the platform, nor a rod with such a name or with two spherical joints."""
 
 from __future__ import annotations
 
@@ -19,32 +19,32 @@ from ..jointgraph import JointGraph, JointSpec, first_body
 
 _WORD = re.compile("[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 _END = re.compile("(.*(foot|hand|flange|gripper|effector|platform))|feet|toe|sole|tool|tcp|eef?")
-"""Words in the names of links that end a robot: feet, tools."""
+"""Words in the names of links at the end of a robot."""
 _SENSOR = re.compile("imu|gyro(scope)?|accelerometer|magnetometer|.*camera|lidar|laser|.*sensor|gps|rgbd?|microphone")
 _ROD = re.compile(".*rod|strut")
 _DRIVE = re.compile(".*rod|strut|crank|motor|actuator|rotor|reference")
-"""Words in the names of what moves a foot or tool."""
+"""Words in the names of links that move such an end."""
 _PLATE = re.compile("plat", re.IGNORECASE)
 
 
 def base(graph: JointGraph) -> str:
-    """The link that no joint carries, or the first of them in the file."""
+    """Return the link that no joint carries, or the first of them in the file."""
     carried = {joint.links[1] for joint in graph.joints.values() if joint.in_tree}
     free = [link for link in graph.links if link not in carried] or list(graph.links)
     if len(free) > 1:
         graph.note(
-            "guess",
-            f"the base is link {free[0]!r}, the first of {len(free)} that no joint carries (--base LINK to change it)",
+            "assumption",
+            f"the base is link {free[0]!r}, the first of {len(free)} that no joint carries (--base LINK changes it)",
             base=True,
         )
     return free[0]
 
 
 def standing(graph: JointGraph, base: str, wanted: str | None, platform: str | None = None) -> str:
-    """The link from which a robot is read: its base; where the ``wanted`` one hangs on something else, the root of
-    that; of a robot that only a free joint holds (``<freejoint>``), or three slides and three turns that place it, the
-    link that floats; where all hangs on one slide and the loops begin at what slides, that link: a rail is no leg.
-    ``platform`` is the one that is given."""
+    """Return the link at which reading starts: the base; if the ``wanted`` base is on another root, that root; for a
+    robot on a free joint (``<freejoint>``), or on three prismatic and three revolute joints that position it, the
+    floating link; if one prismatic joint carries the robot and the loops begin at its slider, that link: a rail is not
+    a leg. ``platform`` is the given one."""
     bonds = graphs.adjacency(graph.links, (joint.links for joint in graph.joints.values()))
     if wanted is not None and wanted in graph.links and wanted not in graphs.component(bonds, base):
         base = wanted
@@ -61,23 +61,23 @@ def standing(graph: JointGraph, base: str, wanted: str | None, platform: str | N
         (bearer,) = held
         trunk = next(link for link in bearer.links if link != base)
         if bearer.type is JointType.FREE and (loops or (platform != trunk and _moving(graph, trunk) > 2)):
-            how = f"floats on the free joint {bearer.name!r}: it is the base, and what it floats in is left out"
+            how = f"floats on the free joint {bearer.name!r}: it is the base; the link below it is left out"
         elif loops and bearer.type is JointType.PRISMATIC and _is_rail(graph, bearer, trunk, platform):
             how = (
-                f"slides on the rail {bearer.name!r}: it is the base, and what it slides on is left out "
-                f"(--base {base} to keep it)"
+                f"slides on the rail {bearer.name!r}: it is the base; the link below it is left out "
+                f"(--base {base} keeps that link)"
             )
         else:
             break
-        graph.note("guess", f"{trunk!r} {how}", base=True)
+        graph.note("assumption", f"{trunk!r} {how}", base=True)
         del graph.joints[bearer.name], graph.links[base]
         base = trunk
     return base
 
 
 def _without_float(graph: JointGraph, base: str, named: set[str | None]) -> str:
-    """The link that floats on three slides and three turns about one point, where several joints hang on it and nothing
-    drives or names what is in between, which is then left out; else ``base``."""
+    """Return the link that floats on three prismatic and three revolute joints about one point, if several joints are
+    on it and the links in between, which are then left out, have no motors or names; else ``base``."""
     chain, link, X = list[JointSpec](), base, np.eye(4)
     kinds, axes, centres = "", list[Array](), list[Array]()
     while len(kinds) < 6:
@@ -108,9 +108,9 @@ def _without_float(graph: JointGraph, base: str, named: set[str | None]) -> str:
         return base
     names = ", ".join(each.name for each in chain)
     graph.note(
-        "guess",
-        f"{link!r} floats on the joints {names}, which place it: it is the base, and what it floats in "
-        f"is left out (--base {base} to keep it)",
+        "assumption",
+        f"{link!r} floats on the joints {names}: it is the base; the links below it are left out "
+        f"(--base {base} keeps those links)",
         base=True,
     )
     for each in chain:
@@ -119,13 +119,13 @@ def _without_float(graph: JointGraph, base: str, named: set[str | None]) -> str:
 
 
 def _moving(graph: JointGraph, link: str) -> int:
-    """How many joints of a link are not fixed."""
+    """Return the number of joints of a link that are not fixed."""
     return sum(link in joint.links and joint.kind is not JointType.FIXED for joint in graph.joints.values())
 
 
 def _is_rail(graph: JointGraph, slide: JointSpec, trunk: str, platform: str | None) -> bool:
-    """Whether the loops begin at what slides, or at what slides on that; a file that names its platform, and gears, are
-    taken at their word."""
+    """Return True if the loops begin at the slider, or at a second slider on it. A file's platform or coupling
+    overrides this."""
     if graph.platform is not None or platform == trunk or any(slide.name in (g.driver, g.driven) for g in graph.gears):
         return False
     import networkx as nx
@@ -140,7 +140,7 @@ def _is_rail(graph: JointGraph, slide: JointSpec, trunk: str, platform: str | No
 
 
 def formation(graph: JointGraph, base: str) -> str | None:
-    """The first body of a formation, None where it is none, which the graph is told."""
+    """Return the first body of a formation, None if there is no formation; record it in the graph."""
     told = [*(each.link for each in graph.sights), *(each.link for each in graph.cameras)]
     found, _ = first_body(graph.links, (joint.links for joint in graph.joints.values()), base, told)
     graph.formation = found is not None
@@ -148,11 +148,11 @@ def formation(graph: JointGraph, base: str) -> str | None:
 
 
 def platform(graph: JointGraph, base: str) -> tuple[str, PlatformChoice]:
-    """The link that is guessed, and why: the one that most ways connect to the base; else the only one with the name of
-    a foot or tool; else the one that several loops close; else the only frame on a fixed joint; else the link farthest
-    away. Where several are as good, it stays open: the first of the candidates.
+    """Return the assumed platform and the reason: the link that most paths connect to the base; else the only link with
+    the name of an end; else the one that several loops close; else the only frame on a fixed joint; else the link
+    farthest from the base. With several candidates the platform stays open: the first candidate is returned.
 
-    Raises ``BadRequest`` where no link moves.
+    Raises ``BadRequest`` if no link moves.
     """
     bodies = _RigidBodies(graph, base)
     if len(bodies.members) == 1:
@@ -162,21 +162,21 @@ def platform(graph: JointGraph, base: str) -> tuple[str, PlatformChoice]:
         names = bodies.platform_candidates(rivals)
         chain = "".join(f"; {note.text}" for note in graph.notes if note.kind == "open")
         such = ", ".join(names[:12]) + (" …" if names[12:] else "")
-        why = f"the file does not say which link is the platform, and several could be{chain}"
-        return names[0], PlatformChoice("open", f"{why}, allowed: --platform LINK, such as {such}")
-    graph.note("guess", f"the platform is link {link!r}, {why} (--platform LINK to change it)")
-    return link, PlatformChoice("guess", why)
+        why = f"the file names no platform, and several links could be it{chain}"
+        return names[0], PlatformChoice("open", f"{why}. Choose it with --platform LINK, such as {such}")
+    graph.note("assumption", f"the platform is link {link!r}, {why} (--platform LINK changes it)")
+    return link, PlatformChoice("assumption", why)
 
 
 def platforms(graph: JointGraph, base: str) -> tuple[list[str], str]:
-    """The link that is guessed and why, or the links among which nothing decides, and no reason."""
+    """Return the assumed platform and the reason, or the candidates and no reason."""
     bodies = _RigidBodies(graph, base)
     link, why, rivals = bodies.platform()
     return bodies.platform_candidates(rivals) if link is None else [link], why
 
 
 def has_word(name: str, words: re.Pattern[str]) -> bool:
-    """Whether one of the words of a name is one of ``words``."""
+    """Return True if a word of the name matches ``words``."""
     return any(words.fullmatch(word.casefold()) for word in _WORD.findall(name))
 
 
@@ -185,14 +185,14 @@ def _ends_robot(name: str) -> bool:
 
 
 def _common(bodies: list[str], *hints: list[str]) -> list[str]:
-    """Those of several bodies that further hints name as well, where one does."""
+    """Return the bodies that further hints name as well, if one does."""
     for hint in hints:
         bodies = [body for body in bodies if body in hint] or bodies
     return bodies
 
 
 class _RigidBodies:
-    """Links held together by fixed joints are one body, named by its first link."""
+    """Rigid bodies: links connected by fixed joints, named by their first link."""
 
     def __init__(self, graph: JointGraph, base: str) -> None:
         joints = list(graph.joints.values())
@@ -213,7 +213,7 @@ class _RigidBodies:
                 self.joints[link].append(joint)
 
     def platform(self) -> tuple[str | None, str, Sequence[str]]:
-        """The platform's link and why, or None and the bodies that could be the platform."""
+        """Return the platform's link and the reason, or None and the bodies that could be the platform."""
         moving = [body for body in self.near if body != self.base]
         others = [body for body in moving if not self._is_never(body)] or moving
         framed = [body for body in others if self._frames(body)]
@@ -229,7 +229,7 @@ class _RigidBodies:
                 floats = sum(
                     joint.type is JointType.FREE for link in self.members[found[0]] for joint in self.joints[link]
                 )
-                return self.title(found[0]), f"which {most - floats} ways connect to the base", ()
+                return self.title(found[0]), f"which {most - floats} paths connect to the base", ()
             distance = graphs.distances(self.near, self.base)
             rivals = [body for body in distance if distance[body] == max(distance.values())]
             closed, why = self._closed(others, distance)
@@ -238,7 +238,7 @@ class _RigidBodies:
         if named:
             named = _common(named, closed, framed)
             return (
-                (self._end_of(named[0]), "whose name is that of a foot or tool", ())
+                (self._end_of(named[0]), "whose name is that of an end of a robot", ())
                 if len(named) == 1
                 else (None, "", named)
             )
@@ -253,8 +253,8 @@ class _RigidBodies:
         return None, "", rivals if len(rivals) > 1 else [*(body for body in others if body in near), *rivals]
 
     def platform_candidates(self, rivals: Sequence[str]) -> list[str]:
-        """The links that may be the platform where nothing decides: open ends and what ends in a loop beside the
-        ``rivals``; those first whose names are those of feet, tools and plates, without sensors and rods."""
+        """Return the links that may be the platform: open ends, and bodies in a loop with the ``rivals``; first those
+        with names of ends and plates, without sensors and rods."""
         blocks = self._blocks()
         often = Counter(body for block in blocks for body in block)
         last = [block for block in blocks if self.base not in block and sum(often[body] > 1 for body in block) == 1]
@@ -265,30 +265,30 @@ class _RigidBodies:
         return sorted(names, key=lambda name: (0, len(name)) if _ends_robot(name) or _PLATE.search(name) else (1, 0))
 
     def title(self, body: str) -> str:
-        """The link that stands for a body: its only frame, else the link with most joints."""
+        """Return the link that represents a body: its only frame, else the link with most joints."""
         frames = self._frames(body)
         if len(frames) == 1:
             return frames[0]
         return max(self.members[body], key=lambda link: len(self.joints[link]))
 
     def _named(self, others: Sequence[str]) -> list[str]:
-        """The bodies with a name of a foot or tool, beyond which no other one has."""
+        """Return the bodies with the name of an end, beyond which there is no other one."""
         named = [body for body in others if any(map(_ends_robot, self.members[body]))]
         return [body for body in named if self._inward(body).issuperset(named)]
 
     def _inward(self, body: str) -> set[str]:
-        """The bodies that ``body`` does not separate from the base, and itself."""
+        """Return the bodies that ``body`` does not separate from the base, and itself."""
         rest = {one: [two for two in ends if two != body] for one, ends in self.near.items() if one != body}
         return {body, *graphs.component(rest, self.base)}
 
     def _end_of(self, body: str) -> str:
-        """The link of a body that has a name of a foot or tool, where one has; else the one that stands for it."""
+        """Return the link of a body that has the name of an end, if there is one; else the one that represents it."""
         title = self.title(body)
         return min(filter(_ends_robot, self.members[body]), key=lambda link: link != title, default=title)
 
     def _is_never(self, body: str) -> bool:
-        """Whether a body is a sensor, or in a loop a rod: by its name, or as it turns freely about a line of two ball
-        joints."""
+        """Return True if a body is a sensor, or in a loop a rod: by its name, or as it spins about the line of two
+        spherical joints."""
         name = self.title(body)
         kinds = {joint.type for link in self.members[body] for joint in self.joints[link]} - {JointType.FIXED}
         return has_word(name, _SENSOR) or (
@@ -300,8 +300,8 @@ class _RigidBodies:
         )
 
     def _blocks(self) -> list[set[str]]:
-        """The bodies of each loop, of several loops where they share two bodies, and of each bond in no loop; none
-        where there are too many bodies."""
+        """Return the bodies of each loop, of several loops if they share two bodies, and of each bond in no loop;
+        nothing for too many bodies."""
         import networkx as nx
 
         if len(self.near) > LARGEST_GUESSED:
@@ -310,7 +310,7 @@ class _RigidBodies:
         return list(map(set, nx.biconnected_components(graph)))  # type: ignore[arg-type]
 
     def _closed(self, others: Sequence[str], distance: Mapping[str, int]) -> tuple[list[str], str]:
-        """The bodies that several loops away from the base close, and why the last one could be the platform."""
+        """Return the bodies that several loops without the base close, and why the last one could be the platform."""
         found, why = list[str](), ""
         for block in self._blocks():
             root = min(block, key=distance.__getitem__)
@@ -318,16 +318,16 @@ class _RigidBodies:
                 inside = [body for body in others if body in block and body != root]
                 bodies, most = self._most_ways(inside, root, block)
                 found += bodies
-                why = f"which {most} ways connect to {self.title(root)!r}" if bodies else why
+                why = f"which {most} paths connect to {self.title(root)!r}" if bodies else why
         return found, why
 
     def _is_outermost(self, body: str) -> bool:
-        """Whether a body ends a chain, or is in a loop with the base."""
+        """Return True if a body ends a chain, or is in a loop with the base."""
         return len(self.near[body]) == 1 or any({body, self.base} <= block for block in self._blocks())
 
     def _most_ways(self, others: Sequence[str], root: str, within: set[str]) -> tuple[list[str], int]:
-        """The bodies that most ways connect to ``root``, three at least, that share no body; and how many. Not counted
-        where there are too many bodies."""
+        """Return the bodies that most paths, at least three without a common body, connect to ``root``, and their
+        number. Not counted for too many bodies."""
         import networkx as nx
 
         if len(self.near) > LARGEST_GUESSED:
@@ -343,7 +343,7 @@ class _RigidBodies:
         return [body for body, count in ways.items() if count == most >= 3], most
 
     def _frames(self, body: str) -> list[str]:
-        """Links of a body that hang on one fixed joint and carry nothing, without sensors."""
+        """Return the links of a body on one fixed joint that carry nothing, without sensors."""
         found = []
         for link in [each for each in self.members[body] if each not in self.closing]:
             own = self.joints[link]

@@ -1,4 +1,4 @@
-"""From a joint graph to a mechanism: closed, its geometry as it is meant, away from singular zero poses."""
+"""Assembly of a joint graph to a mechanism: loops closed, geometry repaired, away from singular zero configurations."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ from .geometry_repair import snap_geometry
 from .loops import LoopAssembly, LoopSolution, Values, regular_values, solve
 from .zero_configuration import moves, with_offsets, with_zero_at
 
-POSTURE = "from a posture near to closing them: --keyframe NAME of the file, or FILE.srdf:NAME"
+POSTURE = "start near a closed configuration: --keyframe NAME of the file, or FILE.srdf:NAME"
 
 
 def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
-    """The mechanism that a foreign file and what the user says of it make.
+    """Return the mechanism of a foreign file with its overrides.
 
     Raises
     ------
     BadRequest
-        For names that there are not, and for a platform that has to be given.
+        For unknown names and a missing platform.
     LoopsNotClosed, RankUndecided
-        Where loops stay open, or where rounded numbers leave no gap between what is free and what is not.
+        For loops that stay open, or whose rank is undecided due to rounding.
     """
     closures.join_halves(graph, overrides.named)
     overrides.apply(graph)
@@ -55,8 +55,8 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
     assembly = LoopAssembly(base, list(graph.joints.values()), graph.gears, start)
     if assembly.size > MOST_LOOP_COORDINATES or len(assembly.loops) > MOST_LOOP_COORDINATES:
         raise BadRequest(
-            f"{graph.file}: {len(assembly.loops)} loops through joints with {assembly.size} coordinates",
-            None,
+            f"{graph.file}: too many loops",
+            f"{len(assembly.loops)} loops through joints with {assembly.size} coordinates",
             f"up to {MOST_LOOP_COORDINATES} of each",
         )
     open_at_zero = assembly.worst(assembly.zero())[1]
@@ -94,7 +94,7 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
 
 
 def _platform(graph: JointGraph, overrides: Overrides, base: str) -> tuple[str, PlatformChoice]:
-    """The platform's link, and how it was chosen."""
+    """Return the platform's link and how it was chosen."""
     if overrides.platform is not None:
         return overrides.platform, GIVEN
     first = assumptions.formation(graph, base) if graph.platform is None and graph.formation else graph.platform
@@ -104,13 +104,13 @@ def _platform(graph: JointGraph, overrides: Overrides, base: str) -> tuple[str, 
 
 
 def deviation(digits: Digits, length: float) -> float:
-    """By how much the decimals of a file's numbers let miss what is meant to be exact (characteristic lengths,
-    radians); ``length`` is the characteristic length, in the file's unit."""
+    """Return the rounding error of exact geometry due to the decimals of a file (characteristic lengths, rad);
+    ``length`` is the characteristic length in the file's unit."""
     return ROUNDED * digits.last_place * max(1.0, 1 / length)
 
 
 def rounding(digits: Digits, length: float, opening: float) -> float:
-    """That deviation; 0 where nothing shows that the numbers are rounded: neither vectors and angles, nor what is open
+    """Return that rounding error; 0 if nothing indicates rounding: neither vectors and angles nor the closure residual
     at zero."""
     found = deviation(digits, length)
     return found if digits.rounded or SAME_GEOMETRY < opening <= NO_FINER * found else 0.0
@@ -120,8 +120,8 @@ def _note_solution(graph: JointGraph, assembly: LoopAssembly, solution: LoopSolu
     name, miss = assembly.worst(assembly.zero())
     moved = moves(assembly, solution.values)
     if moved and miss > SAME_GEOMETRY:
-        pushed = ", after a random push out of a flat pose" if solution.pushed else ""
-        where = "the file's zero pose" if keyframe is None else f"the keyframe {keyframe!r}"
+        pushed = ", after a random push out of a flat configuration" if solution.pushed else ""
+        where = "the file's zero configuration" if keyframe is None else f"the keyframe {keyframe!r}"
         graph.note(
             "solved",
             f"at {where} the loop {name!r} is open by {miss:.3g} (characteristic lengths, radians); "
@@ -154,7 +154,7 @@ def _mechanism(graph: JointGraph, base: str, platform: str, assembly: LoopAssemb
 
 
 def joint_at(joint: JointSpec, poses: Mapping[str, Array], in_tree: bool) -> Joint:
-    """A joint where its links have ``poses``; one that closes a loop in the middle of its two frames."""
+    """Return a joint where its links have ``poses``; a loop closure is put in the middle of its two frames."""
     kind = joint.kind
     X_P, X_S = joint.frames(poses)
     axes: tuple[Array, ...] = ()
@@ -177,9 +177,10 @@ def _couplings(graph: JointGraph, mechanism: Mechanism) -> list[Coupling]:
         if len(joints) == 2 and gear.ratio == 0:
             where = graph.file if gear.line is None else f"{graph.file}:{gear.line}"
             raise BadMechanism(
-                f"{where}: coupling {gear.name!r}, which would hold joint {gear.driven!r}",
+                f"{where}: coupling {gear.name!r} would fix joint {gear.driven!r}; its ratio",
                 gear.ratio,
-                f"a ratio other than 0, or --freeze {gear.driven}",
+                "a ratio other than 0",
+                remedy=f"Fix the joint with --freeze {gear.driven}.",
             )
         if len(joints) == 2:
             found.append(Coupling(gear.name, joints[0].successor, joints[1].successor, gear.ratio, gear.line))
@@ -188,15 +189,15 @@ def _couplings(graph: JointGraph, mechanism: Mechanism) -> list[Coupling]:
             for joint in (graph.joints.get(gear.driver), graph.joints.get(gear.driven))
         ):
             raise BadMechanism(
-                f"{graph.file}: coupling {gear.name!r} of a joint that closes a loop",
+                f"{graph.file}: coupling {gear.name!r} of a loop closure",
                 gear.driven,
-                "joints of one freedom in the spanning tree",
+                "one-dof joints of the spanning tree",
             )
     return found
 
 
 def _away_from_singular(mechanism: Mechanism) -> Mechanism:
-    """A zero pose at which the loops have more freedoms than nearby is left for one nearby."""
+    """Replace a zero configuration at which the loops have a higher mobility than nearby by one nearby."""
     assembly = LoopAssembly.of(mechanism)
     zero = assembly.zero()
     there = regular_values(assembly, zero)
@@ -205,9 +206,9 @@ def _away_from_singular(mechanism: Mechanism) -> Mechanism:
     here, after = assembly.rank(zero), assembly.rank(there)
     freedoms = [assembly.size - rank.value for rank in (here, after)]
     why = (
-        f"singular (its loops have {freedoms[0]} freedoms there, {freedoms[1]} nearby)"
+        f"singular (its loops have mobility {freedoms[0]} there, {freedoms[1]} nearby)"
         if freedoms[1] < freedoms[0]
-        else f"nearly singular (weakest singular value {here.weakest:.1e}, {after.weakest:.1e} nearby)"
+        else f"nearly singular (smallest singular value {here.weakest:.1e}, {after.weakest:.1e} nearby)"
     )
-    note = Note("solved", f"the zero pose is {why}: moved by {moves(assembly, there)}")
+    note = Note("solved", f"the zero configuration is {why}: moved by {moves(assembly, there)}")
     return replace(with_zero_at(mechanism, assembly, there), notes=(*mechanism.notes, note))

@@ -1,4 +1,4 @@
-"""Frames that could be held together: where a file that closes no loop, or not all, may mean one."""
+"""Candidates for loop closures: frames that a file may intend to connect."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from .loops import LoopAssembly
 
 @dataclass(frozen=True)
 class ClosureCandidate:
-    """Two links of different bodies whose frames (almost) coincide while all joints are at zero, and do not when they
-    move: their distance (m), and whether it is no more than rounding."""
+    """Two links of different bodies whose frames (almost) coincide while all joints are at zero, but not when they
+    move: distance (m), and True if it is due to rounding."""
 
     links: tuple[str, str]
     distance: float
@@ -28,16 +28,16 @@ class ClosureCandidate:
 
     @property
     def wish(self) -> str:
-        """What ``--close`` takes: the frames meet in a point."""
+        """Value for ``--close``: the frames meet in a point."""
         return ":".join(self.links)
 
     def __str__(self) -> str:
-        return f"{self.wish} ({1000 * self.distance:.3g} mm apart)"
+        return f"{self.wish} ({1000 * self.distance:.3g} mm)"
 
 
 def closure_candidates(graph: JointGraph, base: str) -> tuple[ClosureCandidate, ...]:
-    """Pairs of frames on what hangs on ``base`` that a closure could hold together, the nearest first; of frames of the
-    same two bodies at the same place the one that a file would give for it (a frame on a fixed joint)."""
+    """Return pairs of frames of the tree of ``base`` that a closure could connect, the nearest first; of frames of the
+    same two bodies at the same point the frame on a fixed joint."""
     joints = [joint for joint in graph.joints.values() if joint.in_tree]
     assembly = LoopAssembly(base, joints)
     at_zero = assembly.poses(assembly.zero())
@@ -50,7 +50,7 @@ def closure_candidates(graph: JointGraph, base: str) -> tuple[ClosureCandidate, 
     points, moved = (_points(assembly, links, values) for values in (assembly.zero(), _move_joints(assembly)))
     apart = np.linalg.norm(points[:, None] - points, axis=2) / assembly.length
     apart_moved = np.linalg.norm(moved[:, None] - moved, axis=2) / assembly.length
-    # near at zero, and farther apart elsewhere: joints that turn about the place itself do not separate frames there
+    # near at zero, and farther apart elsewhere: joints that rotate about the point itself do not separate frames there
     near = np.argwhere(np.triu((apart <= MAY_MEET) & (apart_moved > apart + MAY_MEET / 2), 1))
     busy = Counter(link for joint in joints for link in joint.links)
     ranked = sorted(
@@ -74,26 +74,26 @@ def closure_candidates(graph: JointGraph, base: str) -> tuple[ClosureCandidate, 
 
 
 def without_loop(graph: JointGraph, base: str) -> str | None:
-    """What is told of a graph that hangs on ``base`` as an open chain: that it does, and where it could be closed."""
+    """Return the note on a graph without loops: it is an open chain, and these closures are possible."""
     if graph.gears or len(graph.joints) >= len(graph.links):
         return None
-    text = "nothing in the file closes a loop: it is read as an open chain"
+    text = "no element of the file closes a loop: it is read as an open chain"
     if found := closure_candidates(graph, base):
         text += (
-            f"; frames that lie near to each other: {comma_list(map(str, found), MOST_CANDIDATES)} (--close "
-            f"{found[0].wish} lets two of them meet in a point)"
+            f"; frames close to each other: {comma_list(map(str, found), MOST_CANDIDATES)} (--close "
+            f"{found[0].wish} connects the first two in a point)"
         )
     return text
 
 
 def _points(assembly: LoopAssembly, links: list[str], values: dict[str, Array]) -> Array:
-    """The origins of the links' frames, (count, 3), in metres."""
+    """Return the origins of the links' frames, (count, 3), in metres."""
     poses = assembly.poses(values)
     return np.array([poses[link][:3, 3] for link in links])
 
 
 def _move_joints(assembly: LoopAssembly, seed: int = 0) -> dict[str, Array]:
-    """All joints somewhere else."""
+    """Return random values of all joints."""
     rng = np.random.default_rng(seed)
     return {
         joint.name: step_along(joint, zero(joint), rng.uniform(0.4, 1.0, joint.kind.freedoms), np.eye(3))

@@ -1,4 +1,4 @@
-"""What a file says and what it leaves open, before it is put together: what a guided reader shows and asks."""
+"""Content of a file before assembly and its open choices, for a guided import."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from .candidates import ClosureCandidate, closure_candidates
 
 @dataclass(frozen=True)
 class ImportChoices:
-    """What stands in a file (``joints`` with their motors and closures), the links that could be base and platform, the
-    likeliest first, and why the first is the platform (None: the file says so); frames that a closure could join."""
+    """Joints of a file with motors and closures, the links that could be base and platform, the likeliest first, the
+    reason for the first platform (None: the file names it), and frames that a closure could connect."""
 
     dialect: str
     links: tuple[str, ...]
@@ -27,32 +27,32 @@ class ImportChoices:
     platforms: tuple[str, ...]
     why: str | None
     told: bool
-    """Whether the first of the platforms is the file's or an assumption, not one of several that are as good."""
+    """The first platform is named or assumed, not one of several equal candidates."""
     candidates: tuple[ClosureCandidate, ...]
     notes: tuple[Note, ...]
 
     @property
     def closing(self) -> tuple[JointSpec, ...]:
-        """The joints that close loops."""
+        """Joints that close loops."""
         return tuple(joint for joint in self.joints if not joint.in_tree)
 
     @property
     def moving(self) -> tuple[JointSpec, ...]:
-        """The joints that can be driven."""
+        """Joints that can have motors."""
         return tuple(joint for joint in self.joints if joint.kind.freedoms)
 
     @property
     def proposed_motors(self) -> list[str]:
-        """The joints that could be driven where nothing says which are."""
+        """Joints that could have motors if the file names none."""
         return likely_motors(self.bases[0], self.joints)[0]
 
 
 def choices(path: Path, overrides: Overrides) -> ImportChoices:
-    """What the file at ``path`` leaves open once closures, motors and frozen joints are given; raises as reading it
-    does."""
+    """Return the open choices of the file at ``path`` once closures, motors and frozen joints are given; raises as
+    reading it does."""
     graph = formats.read(robot_file(path, overrides, strict=False))
     if isinstance(graph, Mechanism):
-        raise BadRequest(f"{path}: its dialect leaves nothing open", graph.name)
+        raise BadRequest(f"{path}: this format leaves no choice open", graph.name)
     closures.join_halves(graph)
     overrides.apply(graph)
     closures.merge_points(graph)
@@ -75,8 +75,8 @@ def choices(path: Path, overrides: Overrides) -> ImportChoices:
 
 
 def _platforms(graph: JointGraph, base: str) -> tuple[tuple[str, ...], str | None, bool]:
-    """The links that could be the platform: the file's or the assumption, what was as good, then those that hold most
-    joints."""
+    """Return the links that could be the platform: the file's or the assumed one, equal candidates, then those with
+    most joints."""
     joints = {link: 0 for link in graph.links}
     for joint in graph.joints.values():
         for link in joint.links:

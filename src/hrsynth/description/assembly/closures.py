@@ -1,4 +1,4 @@
-"""Closures read as the joints that they stand for: points on one axis, points in a plane, chains that a writer cut."""
+"""Closures replaced by equivalent joints: points on one axis, points in a plane, chains that a writer cut."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..jointgraph import FrameSpec, JointGraph, JointSpec, Z
 
 
 def merge_points(graph: JointGraph) -> None:
-    """Two points in which the same two links are held together are a revolute joint through both; three are rigid."""
+    """Merge point closures of the same two links: two are a revolute joint through both; three are rigid."""
     noise = ROUNDED * graph.digits.last_place * graph.unit
     table: dict[frozenset[str], list[JointSpec]] = defaultdict(list)
     for joint in graph.joints.values():
@@ -37,13 +37,14 @@ def merge_points(graph: JointGraph) -> None:
         what = "revolute joint" if merged.type is JointType.REVOLUTE else "rigid joint"
         graph.note(
             "merged",
-            f"the points {', '.join(repr(joint.name) for joint in joints)} hold the same two links "
-            f"together and are read as one {what}",
+            f"the points {', '.join(repr(joint.name) for joint in joints)} connect the same two links "
+            f"and are read as one {what}",
         )
 
 
 def _joint_through(joints: list[JointSpec], noise: float) -> JointSpec | None:
-    """The joint that points held together are; ``noise`` (m) is by how much the file's decimals let them miss."""
+    """Return the joint that equals several point closures; ``noise`` (m) is the rounding error of the file's
+    decimals."""
     first = joints[0]
     points = np.array([[joint.ends[joint.links.index(link)].X[:3, 3] for joint in joints] for link in first.links])
     arms = points[:, 1:] - points[:, :1]
@@ -68,9 +69,8 @@ def _frame(z: Array, near: Array | None) -> Array:
 
 
 def points_as_hinges(mechanism: Mechanism, within: float) -> Mechanism:
-    """A point closure between two links that can only move in a plane is a revolute joint normal to it; one between two
-    links that can only turn about a common centre is a revolute joint through that centre; both to ``within``
-    (characteristic lengths, radians)."""
+    """Replace point closures of planar and spherical loops by revolute joints: normal to the plane, or through the
+    common centre; both to ``within`` (characteristic lengths, radians)."""
     joints, notes = dict(mechanism.joints), list(mechanism.notes)
     for joint in [j for j in joints.values() if j.type is JointType.SPHERICAL and not j.in_tree]:
         axis, what = _plane_of(joint, list(joints.values()), within), "planar"
@@ -83,7 +83,7 @@ def points_as_hinges(mechanism: Mechanism, within: float) -> Mechanism:
 
 
 def _plane_of(joint: Joint, joints: list[Joint], within: float) -> Array | None:
-    """The normal of the plane in which the joint's two links move relative to each other, or None."""
+    """Return the normal of the plane in which the joint's two links move relative to each other, or None."""
     for candidate in _hinges_on(joint, joints):
         normal = candidate.axis
         flat = graphs.adjacency(
@@ -95,8 +95,8 @@ def _plane_of(joint: Joint, joints: list[Joint], within: float) -> Array | None:
 
 
 def _spoke_of(joint: Joint, joints: list[Joint], tolerance: float) -> Array | None:
-    """The direction to the joint from the centre about which its two links turn relative to each other, or None;
-    ``tolerance`` (m) is how far axes may miss each other there."""
+    """Return the direction to the joint from the centre about which its two links rotate relative to each other, or
+    None; ``tolerance`` (m) is the largest distance of axes there."""
     others = [j for j in joints if j.name != joint.name]
     for candidate in _hinges_on(joint, others):
         for other in others:
@@ -112,14 +112,14 @@ def _spoke_of(joint: Joint, joints: list[Joint], tolerance: float) -> Array | No
 
 
 def _hinges_on(joint: Joint, joints: list[Joint]) -> list[Joint]:
-    """The revolute joints on the two bodies that a joint joins."""
+    """Return the revolute joints on the two bodies that a joint connects."""
     bonds = graphs.adjacency(joint.links, (j.links for j in joints if j.type is JointType.FIXED))
     bodies = {link for end in joint.links for link in graphs.component(bonds, end)}
     return [j for j in joints if j.type is JointType.REVOLUTE and bodies & set(j.links)]
 
 
 def _keeps(joint: Joint, centre: Array, tolerance: float) -> bool:
-    """Whether a joint lets its two links only turn about a centre."""
+    """Return True if a joint lets its two links only rotate about a centre."""
     match joint.type:
         case JointType.REVOLUTE:
             return lines.distance(centre, joint.point, joint.axis) <= tolerance
@@ -138,9 +138,9 @@ def _flat(joint: Joint, normal: Array, within: float) -> bool:
 
 
 def join_halves(graph: JointGraph, given: tuple[Set[str | None], Set[str]] = (frozenset(), frozenset())) -> None:
-    """What our writers cut is whole again: frames of closures go, and the joint before a rigid closure closes the loop
-    itself. What only has such names, as any file may, stays as it is: what is joined means the same either way, and is
-    neither named by something else in the file nor among the links and joints that are ``given``."""
+    """Undo the cuts of our writers: frames of closures are removed, and the joint before a rigid closure closes the
+    loop itself. Joints that only have such names stay: the result must be equivalent, and neither named elsewhere in
+    the file nor among the ``given`` links and joints."""
     links, joints = graph.named[0] | given[0], graph.named[1] | given[1]
 
     def bare(name: str) -> bool:
@@ -160,7 +160,7 @@ def join_halves(graph: JointGraph, given: tuple[Set[str | None], Set[str]] = (fr
 
 
 def _join(graph: JointGraph, name: str, bare: Callable[[str], bool], busy: Set[str]) -> None:
-    """Let the joint that carries a cut half take the place of the rigid closure."""
+    """Replace the rigid closure by the joint that carries a cut half."""
     own = [joint for joint in graph.joints.values() if name in joint.links]
     stem = name.removesuffix(CUT)
     counted = [part(stem, k) for k in (1, 2, 3)]
@@ -193,8 +193,8 @@ def _join(graph: JointGraph, name: str, bare: Callable[[str], bool], busy: Set[s
 
 
 def _whole(name: str, chain: list[JointSpec], noise: float) -> JointSpec | None:
-    """The joint that a chain of joints at one place is, to the file's decimals; None where it is none by its links,
-    geometry, motors or limits."""
+    """Return the joint that equals a chain of joints at one point, to the file's decimals; None if its links, geometry,
+    motors or limits do not fit."""
     first, *others = chain
     if not others:
         return first

@@ -1,7 +1,7 @@
-"""Chains of slides and turns that only place the platform: coordinates of a modelling tool, not a leg.
+"""Chains that only position the platform: coordinates of a modelling tool, not a leg.
 
-Tools that build a tree of bodies give a platform its place by two slides and a hinge (in a plane) or by three slides
-and a ball (in space), and close the legs against it. Such a chain is passive and forbids nothing that the legs allow.
+Tools that build a tree of links position a platform by P-P-R (in a plane) or P-P-P-S (in space), and close the legs
+against it. Such a chain is passive and forbids nothing that the legs allow.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from .loops import LoopAssembly
 
 _PLANE = re.compile("PPR|RPP|E")
 _SPACE = re.compile("PPP(S|RRR|UR|RU)|(S|RRR|UR|RU)PPP")
-"""The types of the joints of such a chain, from the base or from the platform."""
+"""Types of the joints of such a chain, from the base or from the platform."""
 
 
 def without_coordinates(mechanism: Mechanism) -> Mechanism:
-    """The mechanism with its only chain of coordinates from the base to the platform read as what it is: in space a
-    free joint, in a plane nothing."""
+    """Replace the only coordinate chain from the base to the platform: in space by a free joint, in a plane by
+    nothing."""
     found = [chain for chain in _chains(mechanism) if _are_coordinates(mechanism, chain)]
     if len(found) != 1:
         return mechanism
@@ -45,20 +45,20 @@ def without_coordinates(mechanism: Mechanism) -> Mechanism:
         )
     note = Note(
         "merged",
-        f"the joints {', '.join(names)} place the platform and constrain nothing: read as "
+        f"the joints {', '.join(names)} position the platform and constrain nothing: read as "
         + ("a free joint" if in_space else "no leg"),
     )
     return spanning(replace(rest, notes=(*mechanism.notes, note)))
 
 
 def mobility(mechanism: Mechanism) -> int:
-    """The freedoms of all joints together at the zero configuration."""
+    """Return the mobility at the zero configuration."""
     assembly = LoopAssembly.of(mechanism)
     return sum(joint.kind.freedoms for joint, _, _ in assembly.tree) - assembly.rank(assembly.zero()).value
 
 
 def with_weighed_motors(mechanism: Mechanism) -> Mechanism:
-    """A note where more coordinates are driven than there are freedoms: files put actuators on passive joints too."""
+    """Add a note if more coordinates have motors than the mobility: files put actuators on passive joints too."""
     driven = sum(joint.type.freedoms for joint in mechanism.joints.values() if joint.actuated)
     if driven == 0 or all(joint.in_tree for joint in mechanism.joints.values()):
         return mechanism
@@ -67,14 +67,14 @@ def with_weighed_motors(mechanism: Mechanism) -> Mechanism:
         return mechanism
     note = Note(
         "open",
-        f"{driven} coordinates are driven, but there are {free} freedoms: some motors may be on "
-        "passive joints (--motors JOINTS to name the driven ones)",
+        f"{driven} coordinates have motors, but the mobility is {free}: some motors may be on "
+        "passive joints (--motors JOINTS names the motors)",
     )
     return replace(mechanism, notes=(*mechanism.notes, note))
 
 
 def _chains(mechanism: Mechanism) -> list[list[Joint]]:
-    """The passive chains from the base's body to the platform's, through links that hold nothing else."""
+    """Return the passive chains from the base's body to the platform's through links with two joints."""
     bonds = graphs.adjacency(mechanism.links, (j.links for j in mechanism.joints.values() if j.type is JointType.FIXED))
     base, platform = (graphs.component(bonds, link) for link in (mechanism.base, mechanism.platform))
     busy = {mechanism.reference, *(o.link for o in mechanism.observations)}
@@ -93,7 +93,8 @@ def _chains(mechanism: Mechanism) -> list[list[Joint]]:
 
 
 def _are_coordinates(mechanism: Mechanism, chain: Sequence[Joint]) -> bool:
-    """Whether joints are slides in independent directions and turns about one point, none of them driven."""
+    """Return True if joints are translations in independent directions and rotations about one point, none of them with
+    a motor."""
     word = "".join(str(joint.type) for joint in chain)
     if any(joint.actuated for joint in chain) or not (_PLANE.fullmatch(word) or _SPACE.fullmatch(word)):
         return False

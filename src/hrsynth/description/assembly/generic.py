@@ -1,7 +1,8 @@
-"""A zero pose at which ρ is special, though the loops are as free as nearby (a dead point), is left for a generic one.
+"""Generic zero configuration: one at which ρ is special, though the loops have the mobility of nearby ones, is
+replaced.
 
 ρ is the space of (t, u̇) that the loops allow (docs/pages/theory.md, section 2): t of the platform, u̇ of the default
-segments of the legs. Samples propose; what is said of the robot later is computed anew.
+segments of the legs. Samples decide here; later results are computed anew.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ from .zero_configuration import moves, with_zero_at
 
 @dataclass(frozen=True)
 class _Ranks:
-    """The loops' freedoms, dim ρ, the platform's dof, and how much of that the legs see: all together, then each."""
+    """Mobility of the loops, dim ρ, the platform dof, and how many of these the legs determine: all together, then
+    each."""
 
     freedoms: int
     dimension: int
@@ -36,26 +38,26 @@ class _Ranks:
     seen: tuple[int, ...]
 
     def beside(self, other: _Ranks, labels: tuple[str, ...]) -> str:
-        """Where this and another differ, in words."""
-        single = [f"leg {each} sees" for each in labels]
-        names = [f"legs {', '.join(labels)} see", *single] if len(labels) > 1 else single
+        """Return the first difference of two ranks as a text."""
+        single = [f"leg {each} determines" for each in labels]
+        names = [f"legs {', '.join(labels)} determine", *single] if len(labels) > 1 else single
         for name, one, two in zip(names, self.seen, other.seen, strict=True):
             if (one, self.dof) != (two, other.dof):
-                return f"there {name} {one} of the platform's {self.dof} freedoms, nearby {two}" + (
+                return f"there {name} {one} of the {self.dof} platform dof, nearby {two}" + (
                     f" of {other.dof}" if self.dof != other.dof else ""
                 )
-        return f"there platform and segments move together in {self.dimension} ways, nearby in {other.dimension}"
+        return f"there dim ρ of platform and segments is {self.dimension}, nearby {other.dimension}"
 
 
 def with_generic_zero(mechanism: Mechanism) -> Mechanism:
-    """The mechanism, its zero pose a generic one nearby where it is special; as it is where it has no loops or legs,
-    and where the configurations nearby do not agree."""
+    """Return the mechanism with a generic zero configuration nearby if its own is special; unchanged without loops or
+    legs, or if nearby configurations differ in rank."""
     if all(joint.in_tree for joint in mechanism.joints.values()):
         return mechanism
     try:
         decomposition = decompose(normal_form(mechanism).mechanism)
     except HrsynthError:
-        return mechanism  # what is wrong is told where it is asked about
+        return mechanism  # analyses report what is wrong
     segments = [each for each in defaults_of(decomposition).values() if isinstance(each, Direction)]
     if not segments:
         return mechanism
@@ -89,8 +91,8 @@ def with_generic_zero(mechanism: Mechanism) -> Mechanism:
     kind = "a Type 2 singularity of all legs together" if lost else "special"
     note = Note(
         "solved",
-        f"the zero pose is {kind} ({here.beside(generic, labels)}): moved by "
-        f"{moves(assembly, there)} (--keyframe {STAY} to stay)",
+        f"the zero configuration is {kind} ({here.beside(generic, labels)}): moved by "
+        f"{moves(assembly, there)} (--keyframe {STAY} keeps it)",
     )
     return replace(with_zero_at(mechanism, assembly, there), notes=(*mechanism.notes, note))
 
@@ -98,7 +100,7 @@ def with_generic_zero(mechanism: Mechanism) -> Mechanism:
 def _ranks(
     mechanism: Mechanism, point: Array | None, segments: list[Direction], assembly: LoopAssembly, values: Values
 ) -> tuple[_Ranks, bool]:
-    """The ranks at closed values, and whether their gaps leave no doubt."""
+    """Return the ranks at closed values, and True if their gaps are clear."""
     poses = assembly.scaled_poses(values)
     X = poses[mechanism.platform]
     links = {mechanism.platform, mechanism.reference, *(each.link for each in segments)}
@@ -127,7 +129,7 @@ def _ranks(
 
 
 def _nearby(assembly: LoopAssembly, zero: Values, size: float, rng: np.random.Generator) -> Values | None:
-    """Closed values a random step away, all joints moved; None where they do not close near the step's end."""
+    """Return closed values a random step from zero, all joints moved; None if they do not close near the step's end."""
     kernel = assembly.kernel(zero)
     step = kernel @ rng.normal(size=kernel.shape[1])
     step *= size / float(np.max(np.abs(step), initial=1e-12))
@@ -143,7 +145,7 @@ def _nearby(assembly: LoopAssembly, zero: Values, size: float, rng: np.random.Ge
 
 
 def _beyond_limits(mechanism: Mechanism, assembly: LoopAssembly, values: Values) -> float:
-    """By how much tree joints of one freedom are beyond their limits, all together (m, radians)."""
+    """Return the total violation of the limits of one-dof tree joints (m, radians)."""
     total = 0.0
     for spec, _, _ in assembly.tree:
         limits = mechanism.joints[spec.name].limits

@@ -1,8 +1,8 @@
-"""The nearest mechanism of the simplest structure: relations that hold to the digits of a file are made exact.
+"""Geometry repair: relations that hold to the digits of a file are made exact with the least change.
 
-Printed digits and CAD leave axes parallel to 1e-6, balls of three axes that miss each other, rods equal to 1e-7 m. Such
-noise opens loops, changes ranks (a loop with redundant constraints becomes rigid) and hides what a link is. Of all
-mechanisms with the relations that hold within a tolerance, the nearest one takes the place of the file's:
+Printed digits and CAD leave axes parallel to 1e-6, S of three axes that do not meet, rods equal to 1e-7 m. Such noise
+opens loops, changes ranks (a loop with redundant constraints becomes rigid) and hides the type of joints. Of all
+mechanisms with the relations that hold within a tolerance, the nearest one replaces the file's:
 min ‖x − x₀‖ subject to f(x) = 0, by Gauss-Newton on the constraints with a pull back along their tangent space.
 """
 
@@ -35,8 +35,8 @@ DAMPING = Damping(start=1.0, eased=1.0, least=1.0, most=1e2)
 
 @dataclass(frozen=True, eq=False)
 class RepairedGeometry:
-    """A mechanism with exact ``relations``: those that held only nearly, and the largest shift of a centre (m) and turn
-    of an axis (rad); its normal form before the last of them, and its coordinates."""
+    """Mechanism with exact ``relations``: those that held only nearly, the largest shift of a centre (m) and rotation
+    of an axis (rad), its normal form before the last of them, and its coordinates."""
 
     mechanism: Mechanism
     normal: Mechanism | None = None
@@ -48,11 +48,11 @@ class RepairedGeometry:
 
     @property
     def worst(self) -> float:
-        """The largest defect that was mended."""
+        """Largest repaired defect."""
         return max((relation.defect for relation in self.mended), default=0.0)
 
     def notes(self, tolerance: float, length: float, gap: float) -> list[Note]:
-        """What was made exact, relation by relation; ``gap`` is that of the loops' singular values as written."""
+        """Return the notes on the repair, relation by relation; ``gap`` is the rank gap of the loops as written."""
         change = max(self.shift / length, self.turn)
         found = [
             Note(
@@ -60,8 +60,8 @@ class RepairedGeometry:
                 f"{len(self.mended)} relations of joints that hold to {tolerance:.1g} (characteristic "
                 f"lengths, radians; the worst to {self.worst:.1e}) are made exact, largest change "
                 f"{change:.1e}; centres moved by up to {1e3 * self.shift:.2g} mm, axes turned by up to "
-                f"{np.rad2deg(self.turn):.2g} deg; the loops' singular values as written leave a gap "
-                f"of {gap:.1e} (--tolerance to change it, --as-written to keep the numbers)",
+                f"{np.rad2deg(self.turn):.2g} deg; rank gap of the loops as written "
+                f"{gap:.1e} (--tolerance changes this, --as-written keeps the numbers)",
             )
         ]
         kinds: dict[str, dict[tuple[str, ...], None]] = defaultdict(dict)
@@ -75,21 +75,21 @@ class RepairedGeometry:
 
 
 def snap_geometry(mechanism: Mechanism, residual: float, tolerance: float, possible: float = 0.0) -> Mechanism:
-    """The mechanism, its loops open by ``residual``, with exact relations in place of those that hold to ``tolerance``;
+    """Return the mechanism, its loops open by ``residual``, with relations that hold to ``tolerance`` made exact;
     ``possible`` is one that the numbers allow, but do not show.
 
     Raises
     ------
     StructureUndecided
-        Where a slightly different tolerance would make another robot of it.
+        For a result that depends on small changes of the tolerance.
     RankUndecided
-        Where the loops leave no gap between free and held all the same.
+        For loops without a rank gap after the repair.
     RankBelowRounding
-        Where they hold a direction by what was open alone.
+        For loops whose rank depends on the closure residual alone.
     """
     try:
         normal_form(mechanism)
-    except BadMechanism:  # a platform that cannot move: said where its motion is asked for
+    except BadMechanism:  # a platform that cannot move is reported by analyses of its motion
         return mechanism
     fine = tolerance
     for _ in range(FINER_TRIES):
@@ -124,9 +124,9 @@ def snap_geometry(mechanism: Mechanism, residual: float, tolerance: float, possi
             else [
                 Note(
                     "merged",
-                    f"the loops are open by up to {residual:.2g} (characteristic lengths, radians; a gap of "
+                    f"the loops are open by up to {residual:.2g} (characteristic lengths, radians; "
                     f"{1e3 * residual * mechanism.length:.2g} mm) at zero, within the tolerance of {tolerance:.1g}: "
-                    "the joints that close them are put in the middle",
+                    "the joints that close them are centred",
                 )
             ],
         )
@@ -134,7 +134,8 @@ def snap_geometry(mechanism: Mechanism, residual: float, tolerance: float, possi
 
 
 def _idealise_directions(mechanism: Mechanism, tolerance: float) -> Mechanism:
-    """With the watched directions along segments and axes of their links, or square to axes, that are nearly so."""
+    """Return the mechanism with nearly exact observed directions put along segments and axes of their links, or normal
+    to axes."""
     found, told = list(mechanism.observations), []
     if not found or tolerance <= EXACT:
         return mechanism
@@ -146,13 +147,13 @@ def _idealise_directions(mechanism: Mechanism, tolerance: float) -> Mechanism:
             if np.linalg.norm(meant - seen.direction) > EXACT:
                 found[number] = replace(seen, direction=meant)
                 told.append(f"of leg {seen.leg}")
-    note = Note("merged", f"made to be along segments or axes: watched directions {', '.join(told)}")
+    note = Note("merged", f"made to be along segments or axes: observed directions {', '.join(told)}")
     return replace(mechanism, observations=tuple(found), notes=(*mechanism.notes, note)) if told else mechanism
 
 
 def _direction(bodies: Bodies, link: str, d: Array, length: float, tolerance: float) -> Array:
-    """The segment of joint centres or the axis of a link that is nearest to a direction, within the tolerance, its
-    sense kept; else the direction square to the axes that it nearly is square to."""
+    """Return the segment of joint centres or the axis of a link that is nearest to a direction, within the tolerance,
+    its sense kept; else the direction normal to the axes to which it nearly is normal."""
     joints = bodies.on[bodies.of[link]]
     axes = [axis for joint in joints for axis in joint.axes]
     centres = [joint.point for joint in joints if joint.type is not JointType.PRISMATIC]
@@ -172,8 +173,8 @@ def _direction(bodies: Bodies, link: str, d: Array, length: float, tolerance: fl
 
 
 def nearest(mechanism: Mechanism, tolerance: float, known: RepairedGeometry | None = None) -> RepairedGeometry | None:
-    """The nearest mechanism that has every relation that holds to ``tolerance``; None where they contradict each other;
-    ``known`` where it has the same ones."""
+    """Return the nearest mechanism with all relations that hold to ``tolerance``; None if they contradict each other;
+    ``known`` if it has the same ones."""
     if not 1 < len(mechanism.joints) <= LARGEST_RELATED or tolerance <= EXACT:
         return RepairedGeometry(mechanism)
     bodies = Bodies(mechanism)
@@ -215,8 +216,8 @@ def _names(relations: Sequence[GeometricRelation]) -> set[tuple[str, tuple[str, 
 
 
 def _project(at: JointCoordinates, relations: Sequence[GeometricRelation]) -> tuple[Array, float]:
-    """The nearest coordinates at which all relations hold, and the largest miss that is left; of balls alone there may
-    be no relation."""
+    """Return the nearest coordinates at which all relations hold, and the largest remaining defect; spherical joints
+    alone may have no relation."""
     start, weights = at.start, at.scale
     if not relations:
         return start, 0.0
@@ -228,7 +229,7 @@ def _project(at: JointCoordinates, relations: Sequence[GeometricRelation]) -> tu
         )
 
     def advance(x: Array, here: Residual, factor: float) -> Array:
-        # rows that depend on each other at the solution differ by the miss before it: they are not followed
+        # rows that depend on each other at the solution differ by the residual before it: they are not followed
         U, s, Vt = singular_decomposition(here.J / weights)
         kept = s > max(30 * float(np.max(np.abs(here.error))), 1e-9) * s[0]
         V = Vt[kept].T
@@ -241,9 +242,9 @@ def _project(at: JointCoordinates, relations: Sequence[GeometricRelation]) -> tu
 
 
 def _structure(mechanism: Mechanism) -> str:
-    """What tells two structures apart: the joints of the normal form, and the freedoms of all joints together."""
+    """Return the joints of the normal form and the mobility, which distinguish two structures."""
     assembly = LoopAssembly.of(mechanism)
     free = sum(joint.kind.freedoms for joint, _, _ in assembly.tree) - assembly.rank(assembly.zero()).value
     types = sorted(str(joint.type) for joint in normal_form(mechanism).mechanism.joints.values())
     counts = ", ".join(f"{types.count(each)} {each}" for each in dict.fromkeys(types))
-    return f"joints {counts}; {free} freedoms"
+    return f"joints {counts}; mobility {free}"

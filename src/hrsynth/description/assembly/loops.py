@@ -1,4 +1,4 @@
-"""Putting a joint graph together: tree joints moved until every other joint's two frames meet.
+"""Closing of the loops of a joint graph: tree joints are moved until the two frames of every other joint meet.
 
 Damped Gauss-Newton on the coordinates of the tree joints that lie in loops. Directions in which the loops hardly
 resist (redundant constraints, disturbed by rounded numbers) are not followed. Lengths in characteristic lengths.
@@ -46,12 +46,12 @@ from ..jointmotion import displacement, opening, screws, step_along, zero
 DAMPING = Damping(start=1.0, eased=0.1, least=1e-3, most=1e6)
 SINGLE = (JointType.REVOLUTE, JointType.PRISMATIC)
 Values = dict[str, Array]
-"""The value of every tree joint."""
+"""Value of every tree joint."""
 
 
 class LoopAssembly:
-    """Tree, loops and gears of a joint graph, in which tree joints take values; their zero pose may be a posture. Below
-    ``noise`` an opening may be that of rounded numbers."""
+    """Tree, loops and couplings of a joint graph with values of its tree joints; zero may be a keyframe. A closure
+    residual below ``noise`` may be due to rounding."""
 
     def __init__(
         self, base: str, joints: Sequence[JointSpec], gears: Sequence[CouplingSpec] = (), start: Posture | None = None
@@ -94,7 +94,7 @@ class LoopAssembly:
         self._spent = 0
 
     def _way(self, link: str) -> dict[str, float]:
-        """The tree joints on the way to a link, 1 where they are passed from predecessor to successor, else −1."""
+        """Return the tree joints on the path to a link, 1 if passed from predecessor to successor, else −1."""
         signs = {}
         while link != self.base:
             joint, link = self._parent[link]
@@ -102,18 +102,18 @@ class LoopAssembly:
         return signs
 
     def _signs(self, way: dict[str, float]) -> Array:
-        """The same, an active coordinate each, (size,)."""
+        """Return these signs, one for each active coordinate, (size,)."""
         signs = np.zeros(self.size)
         for joint in self.active:
             signs[self._columns[joint.name]] = way.get(joint.name, 0.0)
         return signs
 
     def zero(self) -> Values:
-        """All tree joints at zero, or in the posture."""
+        """Return the values with all tree joints at zero, or in the keyframe."""
         return {joint.name: self._at_start(joint) for joint, _, _ in self.tree}
 
     def _at_start(self, joint: JointSpec) -> Array:
-        """The value of a joint in the posture, its lengths in characteristic lengths."""
+        """Return the value of a joint in the keyframe, its lengths in characteristic lengths."""
         at_zero = zero(joint)
         value = self._start.get(joint.name, at_zero)
         if value.shape != at_zero.shape:
@@ -121,11 +121,11 @@ class LoopAssembly:
         return scale_pose(value, 1 / self.length) if value.ndim == 2 else value / self.unit(joint)
 
     def unit(self, joint: JointSpec) -> float:
-        """Metres or radians in one unit of a joint's coordinate."""
+        """Return metres or radians in one unit of a joint's coordinate."""
         return self.length if joint.type is JointType.PRISMATIC else 1.0
 
     def scaled_poses(self, values: Values) -> dict[str, Array]:
-        """The pose (4, 4) of every link in the base frame, lengths in characteristic lengths."""
+        """Return the pose (4, 4) of every link in the base frame, lengths in characteristic lengths."""
         if self._last is not None and self._last[0] is values:
             return self._last[1]
         X = {self.base: np.eye(4)}
@@ -136,11 +136,12 @@ class LoopAssembly:
         return X
 
     def poses(self, values: Values) -> dict[str, Array]:
-        """The pose (4, 4) of every link in the base frame, in metres."""
+        """Return the pose (4, 4) of every link in the base frame, in metres."""
         return {link: scale_pose(X, self.length) for link, X in self.scaled_poses(values).items()}
 
     def system(self, values: Values) -> tuple[Array, Array]:
-        """What is open in all loops and gears (rows,), and its derivative by the active coordinates (rows, size)."""
+        """Return the closure residual of all loops and couplings (rows,), and its derivative by the active coordinates
+        (rows, size)."""
         self._spent += self._effort
         X = self.scaled_poses(values)
         twists = np.zeros((6, self.size))
@@ -162,8 +163,8 @@ class LoopAssembly:
         return np.concatenate(errors), np.vstack(rows)
 
     def velocities(self, values: Values, links: Iterable[str]) -> dict[str, Array]:
-        """The twists (6, n) of links (linear at the base origin, angular) for a basis of the velocities that keep the
-        loops closed, joints in no loop last; lengths in characteristic lengths."""
+        """Return the twists (6, n) of links (linear at the base origin, angular) for a basis of the velocities that
+        keep the loops closed, joints in no loop last; lengths in characteristic lengths."""
         X, kernel = self.scaled_poses(values), self.kernel(values)
         columns, size = dict(self._columns), self.size
         for joint, _, _ in self.tree:
@@ -182,12 +183,12 @@ class LoopAssembly:
         return found
 
     def apart(self, one: Values, other: Values) -> float:
-        """The largest difference of the links' poses, lengths in characteristic lengths."""
+        """Return the largest difference of the links' poses, lengths in characteristic lengths."""
         X, Y = self.scaled_poses(one), self.scaled_poses(other)
         return max(float(np.abs(X[link] - Y[link]).max()) for link in X)
 
     def step(self, values: Values, step: Array) -> Values:
-        """The values that a step in the active coordinates leads to."""
+        """Return the values after a step in the active coordinates."""
         X, after = self.scaled_poses(values), dict(values)
         for joint in self.active:
             R = joint.frames(X)[0][:3, :3] if values[joint.name].ndim == 2 else ORIGIN[:3, :3]
@@ -195,7 +196,7 @@ class LoopAssembly:
         return after
 
     def close(self, values: Values, iterations: int = 60, held: Collection[str] = ()) -> tuple[Values, float]:
-        """The closed values that are reached from ``values``, some joints held, and what is left open."""
+        """Return the closed values reached from ``values``, some joints fixed, and the closure residual."""
         before = np.inf
         moving = self.moving(held)
 
@@ -216,7 +217,7 @@ class LoopAssembly:
         return self._polish(values, left, system) if SOLVED < left.size < self.noise else (values, left.size)
 
     def moving(self, held: Collection[str]) -> Array:
-        """1 for the active coordinates, 0 for those of joints that are held, (size,)."""
+        """Return 1 for active coordinates, 0 for those of fixed joints, (size,)."""
         return np.array([float(joint.name not in held) for joint in self.active for _ in range(joint.kind.freedoms)])
 
     def _polish(
@@ -235,7 +236,8 @@ class LoopAssembly:
         return start
 
     def _damped_step(self, at: Residual, factor: float) -> Array:
-        """The damped step, no longer than ``LOOP_STRIDE``; near the solution the plain one without faint directions."""
+        """Return the damped step, no longer than ``LOOP_STRIDE``; near the solution the plain one without weak
+        directions."""
         U, s, Vt = singular_decomposition(at.J)
         if at.size < self.noise and factor <= 1.0:
             kept = s > FAINT * s[0]
@@ -246,20 +248,20 @@ class LoopAssembly:
         return np.asarray(step * min(1.0, LOOP_STRIDE / largest) if largest > 0 else step)
 
     def rank(self, values: Values, cutoff: float = RANK_CUTOFF) -> Rank:
-        """The rank of the loops' and gears' constraints on the joints in loops."""
+        """Return the rank of the constraints of loops and couplings on the joints in loops."""
         return rank_of(np.asarray(np.linalg.svd(self.system(values)[1], compute_uv=False)), cutoff=cutoff)
 
     def freedoms(self, rank: Rank) -> int:
-        """The freedoms of the joints in loops that constraints of a rank leave."""
+        """Return the mobility of the joints in loops for constraints of a rank."""
         return self.size - rank.value
 
     def kernel(self, values: Values) -> Array:
-        """A basis (size, freedoms) of the velocities that keep the loops closed."""
+        """Return a basis (size, mobility) of the velocities that keep the loops closed."""
         _, s, Vt = singular_decomposition(self.system(values)[1], full_matrices=True)
         return np.asarray(Vt[int(np.sum(s > RANK_CUTOFF * max(s, default=1.0))) :].T)
 
     def worst(self, values: Values) -> tuple[str, float]:
-        """The loop that is open most, and by how much."""
+        """Return the loop with the largest closure residual, and this residual."""
         X = self.scaled_poses(values)
         found = [(float(np.linalg.norm(opening(loop, *loop.frames(X))[0])), loop.name) for loop in self.loops]
         found += [(abs(float(_slip(gear, values)[0])), gear.name) for gear in self.gears]
@@ -268,20 +270,20 @@ class LoopAssembly:
 
     @property
     def leaders(self) -> tuple[frozenset[str], frozenset[str]]:
-        """The joints that drive others, motors and gears, and the motors alone."""
+        """Return the joints that drive others, motors and couplings, and the motors alone."""
         motors = frozenset(joint.name for joint in self.active if joint.motor is not None)
         followers = {gear.driven for gear in self.gears}
         return motors | {gear.driver for gear in self.gears if gear.driver not in followers}, motors
 
     def followed(self, values: Values) -> Values:
-        """The values with each follower of a gear where its driver puts it."""
+        """Return the values with each driven joint of a coupling where its driver puts it."""
         found = dict(values)
-        for _ in self.gears:  # a follower may lead another
+        for _ in self.gears:  # a driven joint may drive another one
             found |= {gear.driven: gear.ratio * found[gear.driver] + gear.offset for gear in self.gears}
         return found
 
     def beyond(self, values: Values) -> dict[str, Array]:
-        """The R and P beyond their limits, each with the nearest value a little within them."""
+        """Return the R and P outside of their limits, each with the nearest value a little within them."""
         found, closing = {}, self.closing(values)
         for joint in [*(joint for joint, _, _ in self.tree), *self.loops]:
             if joint.limits is None or joint.kind not in SINGLE:
@@ -298,7 +300,8 @@ class LoopAssembly:
         return found
 
     def wound(self, values: Values, residual: float) -> tuple[Values, float]:
-        """The same values (and what they leave open) with turns by whole ones that bring joints within their limits."""
+        """Return the values (and their closure residual) with full rotations added that bring joints within their
+        limits."""
         geared = {name for gear in self.gears for name in (gear.driver, gear.driven)}
         free = {joint.name for joint, _, _ in self.tree if joint.kind is JointType.REVOLUTE} - geared
         turns = {
@@ -310,8 +313,8 @@ class LoopAssembly:
         return values | {name: value for name, value in turns.items() if name not in still}, residual
 
     def closing(self, values: Values) -> dict[str, float]:
-        """How far from their zero (m, rad) ``values`` put the R and P at which loops are closed: that of a closure is
-        where all tree joints are at zero, that of a joint of the file's tree where its two frames meet."""
+        """Return the distance from their zero (m, rad) of the R and P that close loops: that of a closure is where all
+        tree joints are at zero, that of a joint of the file's tree where its two frames meet."""
         now, then = self.scaled_poses(values), self.scaled_poses({joint.name: zero(joint) for joint, _, _ in self.tree})
         found = {}
         for spec in self.loops:
@@ -330,12 +333,13 @@ class LoopAssembly:
 
     @classmethod
     def of(cls, mechanism: Mechanism) -> LoopAssembly:
-        """The assembly of a mechanism's own joints: closed at zero."""
+        """Return the assembly of a mechanism's joints: closed at zero."""
         return cls(mechanism.base, joints_of(mechanism), gears_of(mechanism))
 
 
 def joints_of(mechanism: Mechanism) -> list[JointSpec]:
-    """A mechanism's joints as a file would give them: both frames at the joint's centre, parallel to the base's."""
+    """Return a mechanism's joints as a file would give them: both frames at the joint's centre, parallel to the
+    base's."""
     found = []
     for joint in mechanism.joints.values():
         one, two = (FrameSpec(link, inverse(mechanism.links[link].pose) @ pose(joint.point)) for link in joint.links)
@@ -344,7 +348,7 @@ def joints_of(mechanism: Mechanism) -> list[JointSpec]:
 
 
 def gears_of(mechanism: Mechanism) -> list[CouplingSpec]:
-    """A mechanism's couplings by the joints that carry their links."""
+    """Return a mechanism's couplings by the joints that carry their links."""
     carrier = {joint.successor: joint.name for joint in mechanism.joints.values() if joint.in_tree}
     return [
         CouplingSpec(each.name, carrier[each.predecessor], carrier[each.successor], each.ratio)
@@ -354,18 +358,18 @@ def gears_of(mechanism: Mechanism) -> list[CouplingSpec]:
 
 @dataclass(frozen=True, eq=False)
 class LoopSolution:
-    """Closed values, what is left open with them, and whether a random push was needed to get there."""
+    """Closed values, their closure residual, and True if a random push was needed."""
 
     values: Values
     residual: float
     pushed: bool = False
     beyond: tuple[str, ...] = ()
-    """The joints that are beyond their limits."""
+    """Joints outside of their limits."""
 
 
 def solve(assembly: LoopAssembly, seed: int = 0) -> LoopSolution:
-    """Close all loops from zero, within the limits of the joints where that is found: by passive joints, else by the
-    drivers of gears too, else by all. Where that stalls (flat and collinear poses), from randomly pushed values too."""
+    """Close all loops from zero, within the joint limits if possible: by passive joints, else by drivers of couplings
+    too, else by all. If that stalls (flat and collinear configurations), from randomly pushed values too."""
     found: list[LoopSolution] = []
     start = assembly.followed(assembly.zero())
     for held in dict.fromkeys((*assembly.leaders, frozenset[str]())):
@@ -385,8 +389,8 @@ def solve(assembly: LoopAssembly, seed: int = 0) -> LoopSolution:
 
 
 def _within_limits(assembly: LoopAssembly, values: Values, held: frozenset[str], pushed: bool) -> LoopSolution:
-    """The closed values that are reached; where joints are beyond their limits there, with these held within them, or
-    let go again from where that comes nearest to closing."""
+    """Return the closed values; for joints outside of their limits, with these fixed within them, or released again
+    where the closure residual is smallest."""
     values, residual = assembly.wound(*assembly.close(values, held=held))
     first = LoopSolution(values, residual, pushed, tuple(assembly.beyond(values)))
     for _ in range(HELD_TRIES if residual <= assembly.noise else 0):
@@ -403,8 +407,8 @@ def _within_limits(assembly: LoopAssembly, values: Values, held: frozenset[str],
 
 
 def regular_values(assembly: LoopAssembly, values: Values) -> Values | None:
-    """The closed values, as near to ``values`` as they are found, at which the loops have fewer freedoms, or resist
-    much more firmly, where ``values`` are singular or nearly so; None where they are neither, or nothing is found."""
+    """Return nearby closed values at which the loops have a lower mobility or a much larger smallest singular value, if
+    ``values`` are singular or nearly so; else, or if none are found, None."""
     here = assembly.rank(values)
     if assembly.freedoms(here) == 0:
         return None
@@ -413,7 +417,8 @@ def regular_values(assembly: LoopAssembly, values: Values) -> Values | None:
     rng = np.random.default_rng(0)
 
     def look(size: float, direction: Array) -> bool:
-        """Whether a step leads to closed values, which are kept where the loops hold more, or more firmly, there."""
+        """Return True if a step leads to closed values; they are kept if the loops have a higher rank, or a clearer
+        one, there."""
         there, residual = assembly.close(assembly.step(values, size / float(np.max(np.abs(direction))) * direction))
         rank = assembly.rank(there)
         if (
@@ -443,7 +448,7 @@ def regular_values(assembly: LoopAssembly, values: Values) -> Values | None:
 
 
 def _slip(gear: CouplingSpec, values: Values) -> Array:
-    """By how much a gear's two coordinates miss each other, (1,)."""
+    """Return the residual of a coupling, (1,)."""
     return values[gear.driven][:1] - gear.ratio * values[gear.driver][:1] - gear.offset
 
 
@@ -453,7 +458,7 @@ def _scale(joint: JointSpec, length: float) -> JointSpec:
 
 
 def _spread(base: str, tree: Sequence[TreeJoint]) -> float:
-    """The characteristic length (m): mean distance of the joints' centres from their centroid, all at zero."""
+    """Return the characteristic length (m): mean distance of the joints' centres from their centroid, all at zero."""
     if not tree:
         return 1.0
     X = zero_poses(base, tree)

@@ -1,9 +1,9 @@
-"""Relations that joints nearly have: axes parallel, perpendicular, coaxial, through one point; centres in a plane, in
-line with an axis; rods equal.
+"""Relations that nearly hold between joints: axes parallel, perpendicular, coaxial, through one point; centres in a
+plane, in line with an axis; rods equal.
 
-All axes that are nearly parallel are one direction, all lines and balls that nearly meet share one point (a *place*):
-so spherical and planar loops, U joints and balls of several R need no relation of their own. Lengths in characteristic
-lengths; a *defect* is by how much a relation misses (characteristic lengths, radians).
+All axes that are nearly parallel are one direction, all lines and spherical joints that nearly meet share one
+point (a *place*): so spherical and planar loops, U joints and S of several R need no relation of their own. Lengths in
+characteristic lengths; a *defect* is the residual of a relation (characteristic lengths, radians).
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ Vectors = NDArray[Any]
 
 @dataclass(frozen=True, eq=False)
 class GeometricRelation:
-    """An equation f(v₁, v₂, …) = 0 of points and directions; f is a polynomial, (..., 3) → (..., m), real or complex.
-    ``at`` is the first coordinate of each of its vectors; ``kind`` and ``of`` say it in words."""
+    """Equation f(v₁, v₂, …) = 0 of points and directions; f is a polynomial, (..., 3) → (..., m), real or complex.
+    ``at`` is the first coordinate of each of its vectors; ``kind`` and ``of`` name it."""
 
     kind: str
     of: tuple[str, ...]
@@ -42,11 +42,11 @@ class GeometricRelation:
     defect: float
 
     def value(self, x: Array) -> Array:
-        """f, shape (m,)."""
+        """Return f, shape (m,)."""
         return np.asarray(self.function(*(x[i : i + 3] for i in self.at)))
 
     def gradient(self, x: Array) -> Array:
-        """Its derivative (m, len(x)), by a complex step: Im f(x + ih e) / h, which takes no differences."""
+        """Return its derivative (m, len(x)), by a complex step: Im f(x + ih e) / h, without differences."""
         count = 3 * len(self.at)
         steps = np.array([x[i : i + 3] for i in self.at]) + 1j * COMPLEX_STEP * np.eye(count).reshape(count, -1, 3)
         by_coordinate = self.function(*np.moveaxis(steps, 1, 0)).imag.T / COMPLEX_STEP
@@ -85,7 +85,7 @@ def _equal_across(p: Vectors, q: Vectors, r: Vectors, s: Vectors, a: Vectors) ->
 
 
 class Bodies:
-    """Links held together by joints of types ``held`` are one body; ``on`` are the joints on each."""
+    """Bodies of links connected by joints of types ``held``; ``on`` are the joints on each."""
 
     def __init__(self, mechanism: Mechanism, held: Container[JointType] = (JointType.FIXED,)) -> None:
         fixed = (j.links for j in mechanism.joints.values() if j.type in held)
@@ -98,15 +98,15 @@ class Bodies:
                     self.on[body].append(joint)
 
     def pairs(self) -> Iterator[tuple[Joint, Joint]]:
-        """Two joints on one body, of bodies with not too many."""
+        """Yield two joints on one body, of bodies with few joints."""
         for joints in self.on.values():
             if len(joints) <= MOST_RELATED_ON_LINK:
                 yield from combinations(joints, 2)
 
 
 class JointCoordinates:
-    """Directions, centres and places of a mechanism in one vector ``start``, each with its weight; what two places or
-    axes ``within`` each other are is one."""
+    """Directions, centres and points of a mechanism in one vector ``start``, each with its weight; points or axes
+    ``within`` each other are one."""
 
     def __init__(self, mechanism: Mechanism, bodies: Bodies, within: float) -> None:
         self.mechanism, self.within = mechanism, within
@@ -116,7 +116,7 @@ class JointCoordinates:
         axes = [(joint.name, k) for joint in joints for k in range(len(joint.axes))]
         vectors = np.array([mechanism.joints[name].axes[k] for name, k in axes]).reshape(-1, 3)
         self.direction: dict[tuple[str, int], tuple[int, float]] = {}
-        """Of each axis the coordinate of its direction, and its sense along it."""
+        """Coordinate of the direction of each axis, and the axis' sense along it."""
         self.members: dict[int, list[tuple[str, int]]] = {}
         for group in _clusters(np.linalg.norm(np.cross(vectors[:, None], vectors[None]), axis=2), within):
             senses = [1.0 if vectors[i] @ vectors[group[0]] > 0 else -1.0 for i in group]
@@ -127,17 +127,17 @@ class JointCoordinates:
             self.direction.update({axes[i]: (at, s) for s, i in zip(senses, group, strict=True)})
         self.point = {joint.name: self._add(joint.point / mechanism.length) for joint in joints}
         self.places: dict[int, list[str]] = {}
-        """Of each place its coordinate and the joints whose lines or centres it is on."""
+        """Coordinate of each point and the joints whose lines or centres it is on."""
         self._find_places(bodies)
 
     @property
     def start(self) -> Array:
-        """The coordinates of the mechanism as it is, directions those in the middle."""
+        """Return the coordinates of the mechanism as it is, directions in the middle of their groups."""
         return np.concatenate(self._vectors)
 
     @property
     def scale(self) -> Array:
-        """How much each coordinate weighs."""
+        """Return the weight of each coordinate."""
         return np.repeat(self.weights, 3)
 
     def _add(self, vector: Array, weight: float = 1.0) -> int:
@@ -146,11 +146,12 @@ class JointCoordinates:
         return 3 * len(self._vectors) - 3
 
     def axis_of(self, joint: Joint) -> int:
-        """The coordinate of the direction of a joint's axis."""
+        """Return the coordinate of the direction of a joint's axis."""
         return self.direction[joint.name, 0][0]
 
     def _find_places(self, bodies: Bodies) -> None:
-        """Where axes on one body meet, and balls; those that are close are one place, with all axes through it."""
+        """Merge nearly coincident intersections of axes on one body and spherical joints to one point, with all axes
+        through it."""
         length = self.mechanism.length
         found: list[Array] = []
         for one, two in bodies.pairs():
@@ -176,7 +177,7 @@ class JointCoordinates:
                 self.places[at] = [joint.name for joint in (*centres, *through)]
 
     def mechanism_of(self, x: Array) -> Mechanism:
-        """The mechanism with other centres and axes."""
+        """Return the mechanism with other centres and axes."""
         joints, centre = {}, dict(self.point)
         for place, names in self.places.items():
             centre.update(
@@ -199,7 +200,7 @@ class JointCoordinates:
 
 
 def _clusters(apart: Array, within: float) -> list[list[int]]:
-    """Groups of numbers that are joined by distances (n, n) up to ``within``."""
+    """Return groups of numbers joined by distances (n, n) up to ``within``."""
     if not len(apart):
         return []
     from scipy.sparse.csgraph import connected_components
@@ -209,7 +210,7 @@ def _clusters(apart: Array, within: float) -> list[list[int]]:
 
 
 def certain(at: JointCoordinates) -> Iterator[GeometricRelation]:
-    """What holds by definition: directions have length one, the axes of a U are at right angles."""
+    """Yield the relations that hold by definition: directions have length one, the axes of a U are perpendicular."""
     for i in at.members:
         yield GeometricRelation("unit", (), _length, (i,), 0.0)
     for joint in at.mechanism.joints.values():
@@ -220,7 +221,8 @@ def certain(at: JointCoordinates) -> Iterator[GeometricRelation]:
 
 
 def of_axes(at: JointCoordinates, bodies: Bodies) -> Iterator[GeometricRelation]:
-    """Candidates among axes and centres: parallel, perpendicular on a body, coaxial on a body, through a place."""
+    """Yield candidates among axes and centres: parallel, perpendicular on a body, coaxial on a body, through a
+    point."""
     x, length = at.start, at.mechanism.length
     for i, members in at.members.items():
         if len(members) > 1:
@@ -229,7 +231,9 @@ def of_axes(at: JointCoordinates, bodies: Bodies) -> Iterator[GeometricRelation]
             )
             yield GeometricRelation("parallel", tuple(dict.fromkeys(name for name, _ in members)), _length, (i,), worst)
     seen = set()
-    for one, two in Bodies(at.mechanism, (JointType.FIXED, JointType.PRISMATIC)).pairs():  # slides keep directions
+    for one, two in Bodies(
+        at.mechanism, (JointType.FIXED, JointType.PRISMATIC)
+    ).pairs():  # prismatic joints keep directions
         for k in range(len(one.axes)):
             for m in range(len(two.axes)):
                 i, j = sorted((at.direction[one.name, k][0], at.direction[two.name, m][0]))
@@ -267,21 +271,21 @@ def _perpendicular(at: JointCoordinates, one: str, two: str, i: int, j: int) -> 
 
 
 def of_centres(at: JointCoordinates, normal: Mechanism, x: Array) -> Iterator[GeometricRelation]:
-    """Candidates among the balls of the ``normal`` form of a mechanism with coordinates ``x``: in line with an axis or
-    square to it, in one plane; rods between the same bodies equal."""
+    """Yield candidates among the spherical joints of the ``normal`` form of a mechanism with coordinates ``x``: in line
+    with an axis or normal to it, in one plane; rods between the same bodies equal."""
     bodies = Bodies(normal)
     balls_of_one = [at.point[joint.name] for joint in at.mechanism.joints.values() if joint.type in BALLS]
     spots = list(dict.fromkeys((*at.places, *balls_of_one)))
     points, ways = (np.array([x[i : i + 3] for i in each]) for each in (spots, list(at.members)))
 
     def spot(joint: Joint) -> int:
-        """The coordinate of a joint's centre."""
+        """Return the coordinate of a joint's centre."""
         if joint.type not in BALLS:
             return at.point[joint.name]
         return spots[int(np.argmin(np.linalg.norm(points - joint.point / at.mechanism.length, axis=1)))]
 
     def way(axis: Array) -> int:
-        """The coordinate of an axis."""
+        """Return the coordinate of an axis."""
         return list(at.members)[int(np.argmin(np.linalg.norm(np.cross(ways, axis), axis=1)))]
 
     def vector(i: int) -> Array:
@@ -304,7 +308,7 @@ def of_centres(at: JointCoordinates, normal: Mechanism, x: Array) -> Iterator[Ge
                 yield GeometricRelation(
                     "in line with an axis", names, _on_line, (i, j, a), float(np.linalg.norm(np.cross(arm, vector(a))))
                 )
-                yield GeometricRelation("square to an axis", names, _across, (i, j, a), abs(float(arm @ vector(a))))
+                yield GeometricRelation("normal to an axis", names, _across, (i, j, a), abs(float(arm @ vector(a))))
         yield from _flat([(joint.name, spot(joint)) for joint in balls], vector, at.within)
     for slide in normal.joints.values():
         ends = [[each for each in bodies.on[bodies.of[link]] if each.type in BALLS] for link in slide.links]
@@ -322,7 +326,7 @@ def of_centres(at: JointCoordinates, normal: Mechanism, x: Array) -> Iterator[Ge
 def _flat(
     balls: Sequence[tuple[str, int]], vector: Callable[[int], Array], within: float
 ) -> Iterator[GeometricRelation]:
-    """All centres of a body in one plane with the three that span the largest triangle."""
+    """Yield the relations that put all centres of a body in one plane with the three that span the largest triangle."""
 
     def area(three: Iterable[tuple[str, int]]) -> float:
         p, q, r = (vector(i) for _, i in three)
@@ -346,7 +350,7 @@ def _flat(
 def _rods(
     bodies: Bodies, spot: Callable[[Joint], int], at: JointCoordinates, vector: Callable[[int], Array]
 ) -> Iterator[GeometricRelation]:
-    """Two links of two joints each between the same two bodies: equal from centre to centre."""
+    """Yield the relation of two links of two joints between the same two bodies: equal from centre to centre."""
     table: dict[frozenset[int], list[Sequence[Joint]]] = defaultdict(list)
     for own, joints in bodies.on.items():
         if len(joints) == 2:

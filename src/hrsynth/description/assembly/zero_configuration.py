@@ -1,4 +1,4 @@
-"""Another closed configuration as a mechanism's zero configuration: the one place where that moves."""
+"""Change of a mechanism's zero configuration; all such changes are made here."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ COUNTED_FROM_ZERO = {
 
 
 def with_zero_at(mechanism: Mechanism, assembly: LoopAssembly, values: Values) -> Mechanism:
-    """The same mechanism with another closed configuration for its zero; the assembly's joints count from its zero."""
+    """Return the mechanism with another closed configuration for its zero; the assembly's joints count from its
+    zero."""
     return zeroed_at(mechanism, assembly.poses(values), _singles(assembly, values))
 
 
 def zeroed_at(
     mechanism: Mechanism, poses: Mapping[str, Array], known: Mapping[str, float] = MappingProxyType({})
 ) -> Mechanism:
-    """The same mechanism with its links, all of them, at these poses (4, 4) as its zero configuration.
+    """Return the mechanism with its links, all of them, at these poses (4, 4) as its zero configuration.
 
-    Limits, wrists, and what else a joint has that is counted from zero, move with it. ``known`` are coordinates of R
-    and P there (m, rad); turns that are not known are within half a one, or the whole turns from that at which they
-    are within their limits.
+    Limits, tilt limits and other coordinates of joints are shifted with it. ``known`` are coordinates of R and P there
+    (m, rad); unknown angles are within half a rotation, or within their limits by full rotations.
     """
     motion = {name: poses[name] @ link.inverse for name, link in mechanism.links.items()}
     joints = []
@@ -60,7 +60,7 @@ def zeroed_at(
 
 
 def at_file_zero(mechanism: Mechanism) -> Mechanism | None:
-    """The same mechanism with the file's zero for its zero configuration; None where its loops are open there."""
+    """Return the mechanism with the file's zero for its zero configuration; None if its loops are open there."""
     assembly = LoopAssembly.of(mechanism)
     values = assembly.zero()
     for spec, _, _ in assembly.tree:
@@ -85,7 +85,7 @@ def at_file_zero(mechanism: Mechanism) -> Mechanism | None:
 
 
 def _coordinates(joint: Joint, D: Array) -> Array | None:
-    """The coordinates of an R, P, U or C whose successor is displaced by D (4, 4), seen from its predecessor."""
+    """Return the coordinates of an R, P, U or C whose successor is displaced by D (4, 4), seen from its predecessor."""
     if joint.type not in (*SINGLE, JointType.UNIVERSAL, JointType.CYLINDRICAL):
         return None
     slide = [joint.axis @ (transform(D, joint.point) - joint.point)] if joint.type.slides else []
@@ -95,7 +95,7 @@ def _coordinates(joint: Joint, D: Array) -> Array | None:
 
 
 def _within(angle: float, limits: Limits | None) -> float:
-    """An angle, or the whole turns from it that are within the limits, if it is not."""
+    """Return an angle, with full rotations added that bring it within the limits if needed."""
     lower = -np.inf if limits is None or limits.lower is None else limits.lower
     upper = np.inf if limits is None or limits.upper is None else limits.upper
     turns = [angle + 2 * np.pi * k for k in (0, 1, -1)]
@@ -103,7 +103,7 @@ def _within(angle: float, limits: Limits | None) -> float:
 
 
 def _counted_from(joint: Joint, q: Array) -> Joint:
-    """A joint that counts from its coordinates q (m, rad), its geometry as it is."""
+    """Return a joint that counts from its coordinates q (m, rad), its geometry unchanged."""
     q = np.where(np.abs(q) > EXACT, q, 0.0)
     if not q.any():
         return joint
@@ -127,12 +127,12 @@ def _counted_from(joint: Joint, q: Array) -> Joint:
 
 
 def _displaced(joint: Joint, F: Array) -> Joint:
-    """A joint whose successor has to be displaced by F (4, 4) to be where the file counts from."""
+    """Return a joint whose successor has to be displaced by F (4, 4) to be where the file counts from."""
     return replace(joint, offset=frozen(F) if np.abs(F - np.eye(4)).max() > EXACT else None)
 
 
 def _shifted(limits: Limits | None, q: float) -> Limits | None:
-    """Limits counted from q."""
+    """Return limits counted from q."""
     if limits is None:
         return None
     lower, upper = (None if bound is None else bound - q for bound in (limits.lower, limits.upper))
@@ -140,8 +140,7 @@ def _shifted(limits: Limits | None, q: float) -> Limits | None:
 
 
 def with_offsets(joints: Mapping[str, Joint], assembly: LoopAssembly, values: Values) -> dict[str, Joint]:
-    """The joints of a file, which lie where ``values`` put them, with limits, and what else the file counts from its
-    zero, counted from there."""
+    """Return the joints of a file at ``values``, with limits and other coordinates counted from there."""
     found = dict(joints)
     X = assembly.poses(values)
     for spec, _, _ in assembly.tree:
@@ -159,7 +158,7 @@ def with_offsets(joints: Mapping[str, Joint], assembly: LoopAssembly, values: Va
 
 
 def _singles(assembly: LoopAssembly, values: Values) -> dict[str, float]:
-    """The coordinates (m, rad) of the R and P of the tree."""
+    """Return the coordinates (m, rad) of the R and P of the tree."""
     return {
         spec.name: float(values[spec.name][0]) * assembly.unit(spec)
         for spec, _, _ in assembly.tree
@@ -168,7 +167,7 @@ def _singles(assembly: LoopAssembly, values: Values) -> dict[str, float]:
 
 
 def _recount(fragment: str, q: float) -> str:
-    """A kept element of a joint with what it counts from zero counted from q."""
+    """Return a kept element of a joint with its coordinates counted from q."""
     if not fragment.startswith(tuple(f"<{tag}" for tag in COUNTED_FROM_ZERO)):
         return fragment
     element = xml.parse_fragment(fragment)
@@ -177,7 +176,7 @@ def _recount(fragment: str, q: float) -> str:
 
 
 def count_from(element: xml.Element, q: float) -> None:
-    """Count coordinates in an element of a joint from q; what is no number stays."""
+    """Count coordinates in an element of a joint from q; attributes that are not numbers stay."""
     for key in COUNTED_FROM_ZERO.get(str(element.tag), ()):
         try:
             value = float(element.get(key, ""))
@@ -188,7 +187,7 @@ def count_from(element: xml.Element, q: float) -> None:
 
 
 def moves(assembly: LoopAssembly, values: Values) -> str:
-    """The coordinates that differ from zero, in words."""
+    """Return the coordinates that differ from zero as a text."""
     found = []
     for joint, _, _ in assembly.tree:
         value = values[joint.name]

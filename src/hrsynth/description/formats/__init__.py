@@ -1,4 +1,4 @@
-"""The dialects of robot files: a folder each, found by itself, with ``DIALECT``, ``read`` and ``write``."""
+"""Formats of robot files: one folder each, discovered automatically, with ``DIALECT``, ``read`` and ``write``."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ NATIVE = "native"
 
 @cache
 def dialects() -> dict[str, FileFormat]:
-    """All dialects by name, in the order in which a file is shown to them."""
+    """Return all formats by name, in the order in which they are tried on a file."""
     folders = [each.name for each in pkgutil.iter_modules(__path__) if each.ispkg]
     found: list[FileFormat] = [import_module(f"{__name__}.{name}").DIALECT for name in folders]
     return {each.name: each for each in sorted(found, key=lambda each: (each.rank, each.name))}
 
 
 def writable() -> list[FileFormat]:
-    """The dialects that are written, the native one first."""
+    """Return the formats that are written, the native one first."""
     found = (each for each in dialects().values() if each.endings)
     return sorted(found, key=lambda each: (each.name != NATIVE, each.name))
 
 
 def read(file: RobotFile) -> JointGraph | Mechanism:
-    """What a file says, in whatever dialect; one that none of them knows is refused as the native one refuses it."""
+    """Return the content of a file in any format; an unknown format is refused by the native reader."""
     name = next((name for name, dialect in dialects().items() if dialect.knows(file)), NATIVE)
     reader: Read = import_module(f"{__name__}.{name}.read").read
     robot = reader(file)
@@ -41,12 +41,12 @@ def read(file: RobotFile) -> JointGraph | Mechanism:
 
 
 def vocabulary(dialect: str) -> Vocabulary:
-    """The names of a dialect that is XML."""
+    """Return the names of a format that is XML."""
     found: Vocabulary = import_module(f"{__name__}.{dialect}.names").NAMES
     return found
 
 
 def writer(dialect: str) -> Write:
-    """What writes a mechanism in a dialect."""
+    """Return the writer of a format."""
     write: Write = import_module(f"{__name__}.{dialect}.write").write
     return write

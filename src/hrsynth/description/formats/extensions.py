@@ -1,6 +1,6 @@
 """Closures that tools add to URDF and SDFormat alike: Drake's constraints and bushings, plugins of Gazebo.
 
-What can be read becomes a closure; what only looks like one is told, with the ``--close`` that would make it one.
+Those that are complete become closures; for others a note gives the ``--close`` that adds them.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from ..elements import XmlReader
 from ..jointgraph import FrameSpec, JointGraph
 
 Frames = Callable[[str], FrameSpec | None]
-"""From the name of a link or frame to the link with the frame's pose in it; None where there is none."""
+"""Map from the name of a link or frame to the link with the frame's pose in it; None for unknown names."""
 
 _ATTACHER = re.compile(r"attach|clos\w*.?loop|loop.?clos", re.IGNORECASE)
 _ENDS = re.compile(r"link|parent|child|body", re.IGNORECASE)
-"""Elements of a plugin that may name what it holds together."""
+"""Elements of a plugin that may name the links that it connects."""
 _DETACHABLE = re.compile(r"detachable.?joint", re.IGNORECASE)
 _BUSHING = "bushing_"
 DRAKE = ("ball_constraint", "linear_bushing_rpy")
@@ -31,18 +31,18 @@ DRAKE = ("ball_constraint", "linear_bushing_rpy")
 
 
 def local(element: xml.Element) -> str:
-    """The name of an element without its namespace or prefix."""
+    """Return the name of an element without its namespace or prefix."""
     return etree.QName(element).localname.rpartition(":")[2]
 
 
 def is_drake(element: xml.Element) -> bool:
-    """Whether an element is one of Drake's, by its namespace, whatever that is."""
+    """Return True if an element is one of Drake's, by its namespace, whatever that is."""
     space = etree.QName(element).namespace or ""
     return "drake" in space or str(element.tag).startswith("drake:")
 
 
 def _value_of(element: xml.Element, tag: str) -> str | None:
-    """What a child element says: ``value`` or ``name`` of it in URDF, its text in SDFormat."""
+    """Return the value of a child element: its ``value`` or ``name`` in URDF, its text in SDFormat."""
     child = next((each for each in xml.children(element) if local(each) == tag), None)
     if child is None:
         return None
@@ -52,25 +52,25 @@ def _value_of(element: xml.Element, tag: str) -> str | None:
 def _ends(
     reader: XmlReader, element: xml.Element, tags: tuple[str, str], frame_of: Frames
 ) -> tuple[FrameSpec, FrameSpec] | None:
-    """The two frames that child elements name; a name that is none, or one link twice, is a defect."""
+    """Return the two frames that child elements name; an unknown name, or one link twice, is a defect."""
     line, found = xml.line(element), []
     for tag in tags:
         name = _value_of(element, tag)
         frame = None if name is None else frame_of(name)
         if frame is None:
-            reader.defect(line, f"<{local(element)}>: <{tag}> is not a link or frame", name)
+            reader.defect(line, f"<{local(element)}>: unknown link or frame in <{tag}>", name)
         else:
             found.append(frame)
     if len(found) < 2:
         return None
     if found[0].link == found[1].link:
-        reader.defect(line, f"<{local(element)}> joins a link to itself", found[0].link)
+        reader.defect(line, f"<{local(element)}>: connects a link to itself", found[0].link)
         return None
     return found[0], found[1]
 
 
 def read_drake(reader: XmlReader, graph: JointGraph, root: xml.Element, frame_of: Frames) -> None:
-    """Drake's ball constraints, which are points, and its bushings, by what they are stiff against."""
+    """Add Drake's ball constraints, as points, and its bushings, by the directions of their stiffness."""
     for element in filter(is_drake, xml.children(root)):
         match local(element):
             case "ball_constraint":
@@ -80,8 +80,8 @@ def read_drake(reader: XmlReader, graph: JointGraph, root: xml.Element, frame_of
             case name if name.endswith("_constraint"):
                 graph.note(
                     "open",
-                    f"<drake:{name}> (line {xml.line(element)}) is not read; where it holds two links "
-                    "together, --close A@x,y,z:B@x,y,z:TYPE does so",
+                    f"<drake:{name}> (line {xml.line(element)}) is not read; if it connects two links, "
+                    "use --close A@x,y,z:B@x,y,z:TYPE",
                 )
 
 
@@ -97,7 +97,7 @@ def _ball_constraint(reader: XmlReader, graph: JointGraph, element: xml.Element,
 
 
 def _bushing(reader: XmlReader, graph: JointGraph, element: xml.Element, frame_of: Frames) -> None:
-    """A bushing holds what it is stiff against; a joint where that is one that loops can have."""
+    """Add the loop joint that constrains the directions in which a bushing is stiff, if there is one."""
     ends = _ends(reader, element, (_BUSHING + "frameA", _BUSHING + "frameC"), frame_of)
     if ends is None:
         return
@@ -115,16 +115,16 @@ def _bushing(reader: XmlReader, graph: JointGraph, element: xml.Element, frame_o
         graph.note(
             "open",
             f"the bushing between {ends[0].link!r} and {ends[1].link!r} is not stiff against "
-            f"{len(free[0])} translations and {len(free[1])} rotations, which no loop joint is: left "
-            f"out (--close {links}:TYPE for the joint that it is meant to be)",
+            f"{len(free[0])} translations and {len(free[1])} rotations, unlike any loop joint, and is left "
+            f"out (--close {links}:TYPE adds a joint)",
         )
         return
     axis = np.eye(3)[(free[1] or free[0] or (2,))[0]]
     graph.close(name, kind, ends, [axis], xml.line(element))
     graph.note(
-        "guess",
+        "assumption",
         f"{name!r} between {ends[0].link!r} and {ends[1].link!r} is read as a {kind.name.lower()} "
-        "joint: it constrains the motions for which its stiffness is not zero",
+        "joint: it constrains the motions with nonzero stiffness",
     )
 
 
@@ -135,9 +135,9 @@ def _vector(reader: XmlReader, element: xml.Element, tag: str) -> Array:
 def read_plugins(
     graph: JointGraph, plugins: list[xml.Element], poses: Mapping[str, Array], models: tuple[str, ...]
 ) -> None:
-    """Gazebo's detachable joints hold two links as they lie at zero (``poses`` in the model's frame), to a model of
-    another name than the robot's only where their frames coincide; plugins that attach links while the simulation runs
-    are told. ``models``: the other models of the file."""
+    """Add Gazebo's detachable joints: they fix two links at their relative pose at zero (``poses`` in the model's
+    frame); links of a model of another name only if their frames coincide. Plugins that attach links during the
+    simulation are noted. ``models``: the other models of the file."""
     for plugin in plugins:
         title = f"{plugin.get('name', '')} {plugin.get('filename', '')}".strip()
         label = title.partition(" ")[0] or "plugin"
@@ -154,14 +154,14 @@ def read_plugins(
             pair = ":".join(dict.fromkeys(named))
             graph.note(
                 "open",
-                f"the plugin {label!r} names two links; where it holds them together, "
-                f"--close {pair}:fixed (or another type) does so",
+                f"the plugin {label!r} names two links; if it connects them, "
+                f"use --close {pair}:fixed (or another type)",
             )
         elif _ATTACHER.search(title):
             graph.note(
                 "open",
-                f"the plugin {label!r} can hold links together while the simulation runs; "
-                "the file does not say which: --close A:B:TYPE where that closes a loop",
+                f"the plugin {label!r} can attach links during the simulation; "
+                "the file does not name them: use --close A:B:TYPE if that closes a loop",
             )
 
 
@@ -173,7 +173,7 @@ def _detachable(graph: JointGraph, plugin: xml.Element, poses: Mapping[str, Arra
         graph.note(
             "open",
             f"the detachable joint from {parent!r} to {child!r} of the model {model!r}, which may be "
-            f"this robot or another: left out (--close {parent}:{child}:TYPE where it closes a loop)",
+            f"this robot or another: left out (--close {parent}:{child}:TYPE adds it)",
         )
         return
     if X is None or model in models:
@@ -186,6 +186,6 @@ def _detachable(graph: JointGraph, plugin: xml.Element, poses: Mapping[str, Arra
     ends = FrameSpec(parent), FrameSpec(child, frozen(X))
     graph.close(graph.fresh("detachable_joint"), JointType.FIXED, ends, line=xml.line(plugin))
     graph.note(
-        "guess",
-        f"the detachable joint of Gazebo holds {parent!r} and {child!r} as they lie at zero: read as a rigid closure",
+        "assumption",
+        f"the detachable joint of Gazebo fixes {parent!r} and {child!r} at their pose at zero: read as a rigid closure",
     )

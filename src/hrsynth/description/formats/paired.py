@@ -1,5 +1,5 @@
-"""Frames that tell by their names where a loop closes: ``closing_X_1`` and ``closing_X_2`` of onshape-to-robot, and
-other spellings (``closedloop1_A_6D`` and ``closedloop1_B_6D``, ``l1_cl1_1`` and ``l1_cl1_2``)."""
+"""Frames whose names mark where a loop closes: ``closing_X_1`` and ``closing_X_2`` of onshape-to-robot, and other
+spellings (``closedloop1_A_6D`` and ``closedloop1_B_6D``, ``l1_cl1_1`` and ``l1_cl1_2``)."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from ..jointgraph import FrameSpec, JointGraph
 
 _ONSHAPE = re.compile(r"closing_(?P<name>.+)_(?P<number>[12])")
 _CLOSES = re.compile(r"(?<![a-z])(?:closing|closure|closed[ _-]?loop|loop[ _-]?clos|cl(?=\d))", re.IGNORECASE)
-"""Words of which a frame that closes a loop has one in its name."""
+"""Words in the names of frames that close a loop."""
 _SIDE = re.compile(r"(?P<stem>.*(?:[_.-]|\d(?=[ab])))(?P<side>[ab12])(?P<kind>[_.-]?[36]d)?", re.IGNORECASE)
 _OTHERS = {"a": "bc", "A": "BC", "1": "203"}
-"""The other side, and sides that a pair does not have."""
+"""Other side of each pair, and sides that a pair does not have."""
 _KIND = re.compile(r"(?<!\d)(?P<number>[36])d(?![a-z])", re.IGNORECASE)
 
 
 def onshape_pairs(reader: XmlReader, graph: JointGraph, frames: Mapping[str, FrameSpec]) -> None:
-    """Frames ``closing_X_1`` and ``closing_X_2`` meet; with ``closing_X_1_z``, ``closing_X_2_z`` as well, in a hinge. A
-    frame without its partner is a defect."""
+    """Close frames ``closing_X_1`` and ``closing_X_2``; with ``closing_X_1_z``, ``closing_X_2_z`` as well, by a
+    revolute joint. A frame without its partner is a defect."""
     for name, frame in frames.items():
         match = _ONSHAPE.fullmatch(name)
         if match is None:
@@ -37,8 +37,9 @@ def onshape_pairs(reader: XmlReader, graph: JointGraph, frames: Mapping[str, Fra
 
 
 def other_pairs(graph: JointGraph, frames: Mapping[str, FrameSpec]) -> None:
-    """Pairs of frames whose names hold a word of closing and differ in one letter or number (A, B or 1, 2): read where
-    nothing else closes a loop, with the joint that ``3D`` or ``6D`` in the name says, else a point; told otherwise."""
+    """Close pairs of frames whose names hold a word of closing and differ in one letter or number (A, B or 1, 2), with
+    the joint of ``3D`` or ``6D`` in the name, else in a point. If other elements close loops, the pairs are only
+    noted."""
     closed = any(not joint.in_tree for joint in graph.joints.values())
     read: dict[str, list[str]] = {}
     for name, frame in frames.items():
@@ -56,11 +57,11 @@ def other_pairs(graph: JointGraph, frames: Mapping[str, FrameSpec]) -> None:
             continue
         graph.close(graph.fresh(match["stem"].strip("_-. ") or "closure"), kind, (frame, frames[partner]))
         graph.closing.update({name, partner})
-        read.setdefault("guess", []).append(wish)
+        read.setdefault("assumption", []).append(wish)
     for kind_of_note, wishes in read.items():
         what = (
-            "frames close loops by their names (another type with --close A:B:TYPE): "
-            if kind_of_note == "guess"
-            else "frames that by their names close a loop are left open, because the file closes others; --close "
+            "frames close loops by their names (--close A:B:TYPE for another type): "
+            if kind_of_note == "assumption"
+            else "frames with names of loop closures are left open, because other elements close loops; --close "
         )
         graph.note(kind_of_note, what + ", ".join(wishes[:12]) + (" …" if wishes[12:] else ""))

@@ -1,4 +1,4 @@
-"""The rules of ``lint``: tables of rules by concept. What lies here is found by itself."""
+"""Rules of ``lint``: tables of rules by concept, discovered automatically."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..findings import LintRule
 
 @cache
 def lint_rules() -> dict[str, LintRule]:
-    """All rules by name, in the order of their tables' names."""
+    """Return all rules by name, in the order of their tables' names."""
     tables = sorted(each.name for each in iter_modules(__path__))
     found: list[LintRule] = [rule for name in tables for rule in import_module(f"{__name__}.{name}").RULES]
     return {rule.name: rule for rule in found}

@@ -1,4 +1,4 @@
-"""Where two files of one robot differ: found with ``--compare OTHER`` alone."""
+"""Differences between two files of one robot: reported with ``--compare OTHER`` only."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ..matching import LinkFit, RobotMatch
 
 
 def _match(file: LintedFile) -> RobotMatch | None:
-    """The two robots in normal form, where both files were read: dialects write one joint as several."""
+    """Return the match of the two robots in normal form (formats write one joint as several), if both were read."""
     one, other = file.mechanism, None if file.other is None else file.other.mechanism
     if one is None or other is None:
         return None
@@ -80,7 +80,7 @@ def _ends(file: LintedFile) -> Iterator[RuleHit]:
         if here != set(theirs.links):
             yield RuleHit(
                 mine.line,
-                f"joint {_names_of(mine, theirs)} joins {' and '.join(mine.links)} here, "
+                f"joint {_names_of(mine, theirs)} connects {' and '.join(mine.links)} here, "
                 f"{' and '.join(theirs.links)} there",
             )
     if match is None:
@@ -101,8 +101,8 @@ def _geometry(file: LintedFile) -> Iterator[RuleHit]:
             joint = match.one.joints[worst]
             yield RuleHit(
                 joint.line,
-                f"link {link!r}: its joints do not lie as in the other file; best laid over each "
-                f"other they miss by up to {fit.misses[worst]:.3g} (characteristic lengths, "
+                f"link {link!r}: its joints are placed differently in the other file; after the best "
+                f"rigid motion they differ by up to {fit.misses[worst]:.3g} (characteristic lengths, "
                 f"radians), at joint {worst!r}",
             )
 
@@ -114,7 +114,7 @@ def _geometry(file: LintedFile) -> Iterator[RuleHit]:
             if apart > SAME_ROBOT:
                 yield RuleHit(
                     joint.line,
-                    f"joint {name!r}: its links lie elsewhere along its axis than in the other "
+                    f"joint {name!r}: its links are shifted along its axis in the other "
                     f"file, by {apart:.3g} (characteristic lengths)",
                 )
 
@@ -141,8 +141,8 @@ def _zero(file: LintedFile) -> Iterator[RuleHit]:
     if moved:
         yield RuleHit(
             None,
-            f"the zero configuration is another one: {', '.join(moved[:8])}{' …' * bool(moved[8:])} stand "
-            "otherwise in the other file",
+            f"the zero configuration differs: joints {', '.join(moved[:8])}{' …' * bool(moved[8:])} have "
+            "other coordinates in the other file",
         )
 
 
@@ -160,7 +160,7 @@ def _senses(file: LintedFile) -> Iterator[RuleHit]:
 
 
 def _partner(match: RobotMatch, theirs: Joint) -> str | None:
-    """The link of one that is the other joint's predecessor."""
+    """Return the link of one that is the other joint's predecessor."""
     return next((mine for mine, link in match.links.items() if link == theirs.predecessor), None)
 
 
@@ -169,8 +169,8 @@ def _motors(file: LintedFile) -> Iterator[RuleHit]:
         if mine.actuated != theirs.actuated:
             yield RuleHit(
                 mine.line,
-                f"joint {_names_of(mine, theirs)} is {'driven' if mine.actuated else 'passive'} here, "
-                f"{'driven' if theirs.actuated else 'passive'} there",
+                f"joint {_names_of(mine, theirs)} is {'actuated' if mine.actuated else 'passive'} here, "
+                f"{'actuated' if theirs.actuated else 'passive'} there",
             )
 
 
@@ -225,7 +225,10 @@ def _gears(file: LintedFile) -> Iterator[RuleHit]:
     for ends in dict.fromkeys([*mine, *theirs]):
         a, b = mine.get(ends), theirs.get(ends)
         if a is None or b is None or abs(a.ratio - b.ratio) > SAME_ROBOT * abs(a.ratio):
-            words = ["no gear" if each is None else f"{each.name!r} with the ratio {each.ratio:g}" for each in (a, b)]
+            words = [
+                "no coupling" if each is None else f"coupling {each.name!r} with the ratio {each.ratio:g}"
+                for each in (a, b)
+            ]
             yield RuleHit(None if a is None else a.line, f"{words[0]} here, {words[1]} there")
 
 
@@ -234,7 +237,7 @@ def _rule(
     severity: str,
     title: str,
     find: Callable[[LintedFile], Iterator[RuleHit]],
-    explanation: str = "Two files of one robot that differ are two robots.",
+    explanation: str = "Files that differ describe two robots.",
 ) -> LintRule:
     return LintRule(f"differs-{name}", severity, title, explanation, "correct the file that is wrong", find)
 
@@ -245,7 +248,7 @@ RULES = (
         "error",
         "a joint or closure that one file has",
         _joints,
-        "It has no partner by name, place or structure. Closures that a dialect does not have are often lost this way.",
+        "It has no partner by name, place or structure. Closures that a format does not have are often lost this way.",
     ),
     _rule("type", "error", "joints of different types", _types),
     _rule("ends", "error", "joints between other links, another base or platform", _ends),
@@ -255,7 +258,7 @@ RULES = (
         "joints placed differently on a link",
         _geometry,
         "Compared link by link, so it does not matter where the link is at zero, how its frame is placed, or where "
-        "along its axis a hinge has its origin.",
+        "along its axis a revolute joint has its origin.",
     ),
     _rule(
         "zero",
@@ -271,8 +274,8 @@ RULES = (
         _senses,
         "A command for one moves the other backwards.",
     ),
-    _rule("motor", "error", "a joint that is driven in one file", _motors),
+    _rule("motor", "error", "a joint with a motor in one file only", _motors),
     _rule("limit", "warning", "different limits", _limits, "Measured from the zero of each file."),
     _rule("mass", "warning", "different masses or inertias", _masses),
-    _rule("gear", "error", "different gears", _gears),
+    _rule("coupling", "error", "different couplings", _gears),
 )

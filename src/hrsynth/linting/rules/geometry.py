@@ -1,4 +1,4 @@
-"""Geometry that is meant but rounded, and what writes it back as it is meant."""
+"""Rounded geometry, and the fix that writes the repaired one."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..findings import Fix, LintRule, RuleHit
 from ..linted_file import LintedFile
 
 ROUNDED = re.compile(r"\d+ relations of joints|made to be |the loops are open by up to ")
-"""How the reader's notes of such relations begin."""
+"""Beginnings of the reader's notes on such relations."""
 
 
 def _rounded(file: LintedFile) -> Iterator[RuleHit]:
@@ -28,8 +28,8 @@ def _rounded(file: LintedFile) -> Iterator[RuleHit]:
 
 
 def _as_meant(file: LintedFile, robot: Mechanism) -> Fix | None:
-    """What gives every joint of a URDF the place that it is read to have, where each of its joints is one of the
-    robot's (or the tip of one) and its zero pose has not moved."""
+    """Return the fix that writes every joint of a URDF where it is read, if each of its joints is one of the robot's
+    (or the tip of one) and its zero configuration has not moved."""
     graph = file.said
     if file.dialect != "urdf" or graph is None or any(note.kind == "solved" for note in robot.notes):
         return None
@@ -90,8 +90,8 @@ RULES = (
         "warning",
         "relations that hold up to printed digits",
         "Axes parallel to six digits, rods of almost equal length: over-constrained loops lock or lose rank in "
-        "programs that take the digits literally. This program corrects such relations, and says so.",
-        "write the numbers with all their digits (in other dialects: hrsynth convert IN OUT)",
+        "programs that take the digits literally. hrsynth repairs such relations and reports it.",
+        "write the numbers with all their digits (in other formats: hrsynth convert IN OUT)",
         _rounded,
         fixable=True,
     ),

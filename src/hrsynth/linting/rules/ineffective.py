@@ -1,4 +1,4 @@
-"""What a file says to no effect: elements and attributes that its format does not have, legs that are none."""
+"""Content without effect: elements and attributes that the format does not have, observed links that are in no leg."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def _unknown(file: LintedFile) -> Iterator[RuleHit]:
         near, severity = each.remedy, "error" if each.meant else "warning" if each.remedy else None
         yield RuleHit(
             each.line,
-            f"unknown {each.place}, found {each.found}{near and f', nearly {near}'}",
+            f"unknown {each.place}: got {each.found}{near and f', similar to {near}'}",
             advice=near and f"write {near}",
             severity=severity,
         )
@@ -34,7 +34,7 @@ def _legs(file: LintedFile) -> Iterator[RuleHit]:
     except BadRobotFile as error:
         for line, text in defects_of(error):
             yield RuleHit(line, text)
-    except HrsynthError:  # told by other rules, or by the questions that need legs
+    except HrsynthError:  # reported by other rules, or by the analyses that need legs
         return
 
 
@@ -43,8 +43,8 @@ RULES = (
         "element-unknown",
         "note",
         "an element or attribute that the format does not have",
-        "Most readers ignore it silently, and use the default instead of what it was meant to say: an axis along "
-        "x, no motor, no limit. This program refuses one that is a misspelling (an error).",
+        "Most readers ignore it silently and use the default of the intended name: an axis along "
+        "x, no motor, no limit. hrsynth refuses one that is a misspelling (an error).",
         "nothing, if another program reads it",
         _unknown,
     ),
@@ -53,7 +53,7 @@ RULES = (
         "error",
         "observed directions that contradict the robot's legs",
         "A link that is in no leg, one label for two legs, two labels for one: the file is read, but commands "
-        "that watch legs refuse it.",
+        "that observe legs refuse it.",
         "correct the link or label named in the message",
         _legs,
     ),

@@ -1,4 +1,4 @@
-"""Limits of joints: what readers drop, what excludes the pose that everything is counted from, what is missing."""
+"""Limits of joints: invalid ones, limits that exclude the zero configuration, missing ones."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def _unlimited(file: LintedFile) -> Iterator[RuleHit]:
     for joint in () if graph is None else graph.joints.values():
         open_ended = joint.limits is None or None in (joint.limits.lower, joint.limits.upper)
         if joint.motor is not None and joint.type in (JointType.REVOLUTE, JointType.PRISMATIC) and open_ended:
-            yield RuleHit(joint.line, f"the driven joint {joint.name!r} has no range")
+            yield RuleHit(joint.line, f"the actuated joint {joint.name!r} has no range")
 
 
 RULES = (
@@ -97,8 +97,7 @@ RULES = (
         "limits-empty",
         "warning",
         "both limits are the same number",
-        "Exporters write 0 and 0 where they know no range. Simulators then lock the joint; this program reads it "
-        "as free.",
+        "Exporters write 0 and 0 for an unknown range. Simulators then lock the joint; hrsynth reads it as free.",
         "write the true range; a revolute joint without one is of type continuous",
         _empty,
     ),
@@ -108,7 +107,7 @@ RULES = (
         "limits exclude the zero of the joint",
         "Loops are closed, mechanisms compared and most controllers started at the zero configuration. If limits "
         "exclude it, simulators start with a jump.",
-        "measure the coordinate from another pose, or widen the limits",
+        "count the coordinate from another configuration, or widen the limits",
         _zero,
     ),
     LintRule(
@@ -123,8 +122,8 @@ RULES = (
     LintRule(
         "motor-unlimited",
         "note",
-        "a driven joint without a range",
-        "Paths, grids and the choice of legs respect limits only if the file gives them.",
+        "an actuated joint without a range",
+        "Paths, grids and the selection of legs respect limits only if the file gives them.",
         "write the motor's range",
         _unlimited,
     ),

@@ -1,4 +1,4 @@
-"""What closes loops: closures that are open at zero, on the wrong side, that repeat others, or say nothing."""
+"""Loop closures: open at zero, mirrored, redundant, or without data."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from ..linted_file import LintedFile
 from .names import OWN, removal
 
 CLOSING = ("loop", "constraint", "loop_joint", "joint", "connect", "weld", "coupling")
-"""Elements that say how a loop closes, in any dialect."""
+"""Elements that close loops, in any format."""
 LEAST_BETWEEN = 3
-"""Joints that move in the shortest loop, besides the one that closes it."""
+"""Number of movable joints in the shortest loop, without the one that closes it."""
 
 
 def as_written(file: LintedFile) -> tuple[JointGraph, LoopAssembly] | None:
-    """The loops of a file before anything is solved, merged or made exact; nothing may change them."""
+    """Return the loops of a file before anything is solved, merged or repaired; nothing may change them."""
     return file.remember("as written", lambda: _as_written(file))
 
 
@@ -68,9 +68,9 @@ def _open(file: LintedFile) -> Iterator[RuleHit]:
     if closed.residual > NOISE:
         yield RuleHit(
             graph.joints[worst].line,
-            text + f"; no way to close them was found (residual {closed.residual:.3g})",
+            text + f"; no closed configuration was found (residual {closed.residual:.3g})",
             None,
-            "correct the dimensions, or the frames in which the closures are given",
+            "correct the dimensions, or the frames of the closures",
         )
         return
     text += f"; they close with {moves(assembly, closed.values)}"
@@ -83,7 +83,7 @@ def _open(file: LintedFile) -> Iterator[RuleHit]:
 
 
 def _by_digits(file: LintedFile, graph: JointGraph, assembly: LoopAssembly) -> bool:
-    """Whether rounded numbers explain what is open: no joint has to move, numbers are to be made exact."""
+    """Return True if rounded numbers explain the closure residual: geometry repair suffices, no joint has to move."""
     miss = assembly.worst(assembly.zero())[1]
     explained = file.given.tolerance or rounding(graph.digits, assembly.length / graph.unit, miss)
     return not file.given.as_written and miss <= NO_FINER * explained
@@ -96,8 +96,8 @@ def _miss(joint: JointSpec, poses: dict[str, np.ndarray], length: float) -> floa
 
 
 def _mend_zero(file: LintedFile, graph: JointGraph, assembly: LoopAssembly, closed: LoopSolution) -> Fix | None:
-    """Let every joint that moved count from where it is closed: its origin takes the displacement, its limits and the
-    offset of its mimic lose it."""
+    """Return the fix that counts every joint from the closed configuration: its origin takes the displacement, its
+    limits and the offset of its mimic lose it."""
     if file.dialect != "urdf" or file.expanded or closed.beyond:
         return None
     moved = []
@@ -105,7 +105,7 @@ def _mend_zero(file: LintedFile, graph: JointGraph, assembly: LoopAssembly, clos
         if np.array_equal(displacement(joint, closed.values[joint.name]), np.eye(4)):
             continue
         element = file.element(graph.joints[joint.name].line, "joint", name=joint.name)
-        part = OWN.search(joint.name)  # of a chain that is one joint only as long as its frames are not turned apart
+        part = OWN.search(joint.name)  # of a chain that is one joint only if its frames stay aligned
         if element is None or part or joint.kind not in (JointType.REVOLUTE, JointType.PRISMATIC):
             return None
         moved.append((joint, element))
@@ -142,7 +142,7 @@ def _rezero(
 
 
 def _shift_limits(element: xml.Element, q: float) -> None:
-    """Count the limits of a joint's element from q, and what else of it is counted from zero."""
+    """Count the limits and other coordinates of a joint's element from q."""
     for limit in element.iterfind("limit"):
         free = (limit.get("free") or "").split()
         _less(limit, q, *(key for key in ("lower", "upper") if key not in free))
@@ -158,7 +158,7 @@ def _less(element: xml.Element, q: float, *keys: str) -> None:
 
 
 def _opposite(joint: JointSpec, poses: dict[str, np.ndarray]) -> bool:
-    """Whether a hinge's (or slide's) two axes point opposite ways where its frames meet."""
+    """Return True if the two axes of a joint are opposite when its frames coincide."""
     if joint.kind not in (JointType.REVOLUTE, JointType.CYLINDRICAL, JointType.PLANAR) or len(joint.axes) != 1:
         return False
     X, Y = joint.frames(poses)
@@ -174,13 +174,11 @@ def _mirrored(file: LintedFile) -> Iterator[RuleHit]:
     for loop in assembly.loops:
         joint = graph.joints[loop.name]
         if _opposite(joint, poses):
-            yield RuleHit(
-                joint.line, f"the two axes of {joint.name!r} point opposite ways at zero", _turn_axis(file, joint)
-            )
+            yield RuleHit(joint.line, f"the two axes of {joint.name!r} are opposite at zero", _turn_axis(file, joint))
 
 
 def _turn_axis(file: LintedFile, joint: JointSpec) -> Fix | None:
-    """Turn the child's axis of a ``<constraint>`` round."""
+    """Return the fix that reverses the child's axis of a ``<constraint>``."""
     element = file.element(joint.line, "constraint", name=joint.name)
     axis = None if element is None else element.find("child_axis")
     if axis is None:
@@ -189,12 +187,12 @@ def _turn_axis(file: LintedFile, joint: JointSpec) -> Fix | None:
 
 
 def _reverse(axis: xml.Element) -> None:
-    """As it is then: another mend may have changed it."""
+    """Reverse the current axis, which another fix may have changed."""
     axis.set("xyz", numerals.exact_vector(-numerals.parse(axis.get("xyz", "1 0 0"), 3)))
 
 
 def nearby(file: LintedFile) -> NearbyFreedoms | None:
-    """The freedoms of the file's mechanism, where it has loops and was read."""
+    """Return the mobility counts of the file's mechanism, if it was read."""
     robot = file.mechanism
     return None if robot is None else file.remember("freedoms", lambda: NearbyFreedoms(robot))
 
@@ -206,7 +204,7 @@ def _dead(file: LintedFile) -> Iterator[RuleHit]:
         line = _line(file, name)
         own = None if graph is None else graph.joints.get(name)
         element = None if own is not None and own.in_tree else file.element(line, *CLOSING, name=name)
-        yield RuleHit(line, f"without {name!r} the mechanism is as free as with it", removal(file, element))
+        yield RuleHit(line, f"{name!r} does not change the mobility", removal(file, element))
 
 
 def _line(file: LintedFile, name: str) -> int | None:
@@ -233,18 +231,17 @@ def _redundant(file: LintedFile) -> Iterator[RuleHit]:
         if name not in dead:
             yield RuleHit(
                 _line(file, name),
-                f"{count} of the {rows(name)} constraints of {name!r} repeat those of the loops before it",
+                f"{count} of the {rows(name)} constraints of {name!r} are redundant with those of earlier loops",
             )
 
 
 def is_unclosed(robot: Mechanism) -> bool:
-    """Whether nothing closes a loop."""
+    """Return True if no joint or coupling closes a loop."""
     return not robot.couplings and all(joint.in_tree for joint in robot.joints.values())
 
 
 def is_watched(robot: Mechanism) -> bool:
-    """Whether a robot is open on purpose, and what counts is what is seen of it: formations, a body that nothing holds,
-    arms with a camera."""
+    """Return True if a robot is open on purpose: formations, free bodies, arms with a camera."""
     seen = robot.formation or robot.observations or robot.cameras
     return is_unclosed(robot) and (bool(seen) or all(joint.type is JointType.FREE for joint in robot.joints.values()))
 
@@ -256,8 +253,8 @@ def _none(file: LintedFile) -> Iterator[RuleHit]:
 
 
 def _consecutive(graph: JointGraph, one: str, two: str) -> bool:
-    """Whether the frames are merely those of joints near to each other: less than three joints that move are between
-    them, which a loop has besides the one that closes it, or one carries the other, and that carries more."""
+    """Return True if the frames are those of neighbouring joints: fewer than three movable joints are between them, or
+    one carries the other, which carries more."""
     carrier = {joint.links[1]: joint for joint in graph.joints.values() if joint.in_tree}
     ways: list[list[str]] = []
     for tip in (one, two):
@@ -282,9 +279,9 @@ def _coincide(file: LintedFile) -> Iterator[RuleHit]:
         if each.coincides and not held & {one, two} and not _consecutive(graph, one, two):
             yield RuleHit(
                 graph.links[two].line,
-                f"the frames of {one!r} and {two!r} lie {1000 * each.distance:.3g} mm "
-                "apart at zero, and nothing keeps them together when the joints move",
-                advice=f"if they should meet: --close {each.wish}",
+                f"the frames of {one!r} and {two!r} are {1000 * each.distance:.3g} mm "
+                "apart at zero, and nothing connects them when the joints move",
+                advice=f"if they should coincide: --close {each.wish}",
             )
 
 
@@ -293,17 +290,17 @@ RULES = (
         "loop-open",
         "error",
         "loops that are open at the zero configuration",
-        "A simulator pulls them shut with a jump, and where two closings are possible the wrong one may be taken. "
-        "This program finds the nearest closed pose, reports the joints that it moves, and counts from there.",
-        "correct the mistyped dimension or, if all are right, measure the joints that moved from where the loops close",
+        "A simulator closes them with a jump, and if there are two closed configurations, perhaps in the wrong one. "
+        "hrsynth finds the nearest closed configuration, reports the joints that it moves, and counts from there.",
+        "correct the mistyped dimension or, if all are right, count the moved joints from the closed configuration",
         _open,
         fixable=True,
     ),
     LintRule(
         "loop-mirrored",
         "error",
-        "a closure whose two axes point opposite ways",
-        "The hinge fits, but making the axes agree turns a link by half a turn: the robot is read as "
+        "a closure with opposite axes",
+        "The joint fits, but aligning the axes rotates a link by 180 degrees: the robot is read as "
         "its mirror image, or not at all.",
         "reverse one of the two axes",
         _mirrored,
@@ -312,8 +309,8 @@ RULES = (
     LintRule(
         "constraint-dead",
         "warning",
-        "a closure or gear that constrains nothing",
-        "What is closed twice is overdetermined: solvers of constraint forces have no single answer, and rounded "
+        "a closure or coupling that constrains nothing",
+        "A loop closed twice is overdetermined: solvers of constraint forces have no unique solution, and rounded "
         "numbers may lock the loop.",
         "remove it",
         _dead,
@@ -322,10 +319,10 @@ RULES = (
     LintRule(
         "constraint-redundant",
         "note",
-        "constraints that repeat others",
+        "redundant constraints",
         "Normal in planar and over-constrained loops, and harmless in ideal geometry. Solvers of constraint "
-        "forces have no single answer, and rounded numbers may lock the loop.",
-        "nothing, or a joint with more freedoms (a ball instead of a hinge)",
+        "forces have no unique solution, and rounded numbers may lock the loop.",
+        "nothing, or a joint with more dof (spherical instead of revolute)",
         _redundant,
     ),
     LintRule(
@@ -333,16 +330,16 @@ RULES = (
         "warning",
         "no loop",
         "The closures were perhaps lost in a conversion, or are in a file or launch script next to this one.",
-        "close it: --close A:B[:TYPE], where A and B are frames that meet",
+        "close it: --close A:B[:TYPE] with frames A and B that coincide",
         _none,
     ),
     LintRule(
         "frames-coincide",
         "warning",
-        "frames that coincide and are not closed",
-        "Several tools mark a loop by two frames at the same place on links that move apart; a loop that is not "
+        "coincident frames that no joint connects",
+        "Several tools mark a loop by two coincident frames on different links; a loop that is not "
         "closed is an open chain.",
-        "if they should meet: --close A:B",
+        "if they should stay coincident: --close A:B",
         _coincide,
     ),
 )

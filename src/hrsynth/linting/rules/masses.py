@@ -19,7 +19,7 @@ from .names import OWN
 
 
 def moving(file: LintedFile) -> set[str]:
-    """The links that some joint moves: those that are not held to the base by fixed joints alone."""
+    """Return the links that some joint moves: those that are not fixed to the base."""
     graph = file.said
     if graph is None:
         return set()
@@ -35,7 +35,7 @@ def _negative(file: LintedFile) -> Iterator[RuleHit]:
     for each in inertials(file):
         if each.mass is not None and (value := each.mass.value) is not None and value < 0:
             yield RuleHit(
-                xml.line(each.element), f"link {each.link!r} has the mass {value:g}", partial(_without_sign, each)
+                xml.line(each.element), f"link {each.link!r} has mass {value:g}", partial(_without_sign, each)
             )
 
 
@@ -49,11 +49,11 @@ def _zero(file: LintedFile) -> Iterator[RuleHit]:
     for each in inertials(file):
         massless = each.mass is None or each.mass.value == 0
         if massless and each.link in moved and each.inertia is not None and np.any(each.inertia):
-            yield RuleHit(xml.line(each.element), f"link {each.link!r} moves, has an inertia, and no mass")
+            yield RuleHit(xml.line(each.element), f"link {each.link!r} moves and has an inertia, but no mass")
 
 
 def second_moments(inertia: Array) -> tuple[Array, Array]:
-    """Eigenvalues and eigenvectors of ∫ r rᵀ dm = ½ tr(I) 1 − I: no body has a negative one, which is the triangle
+    """Return eigenvalues and eigenvectors of ∫ r rᵀ dm = ½ tr(I) 1 − I; a negative eigenvalue breaks the triangle
     inequality of the principal moments."""
     return np.linalg.eigh(np.trace(inertia) / 2 * np.eye(3) - inertia)
 
@@ -74,7 +74,7 @@ def _impossible(file: LintedFile) -> Iterator[RuleHit]:
 
 
 def _nearest(inertial: InertialElement) -> None:
-    """The inertia with the same second moments but for the negative ones, which are zero."""
+    """Write the inertia with negative second moments set to zero."""
     assert inertial.inertia is not None
     values, vectors = second_moments(inertial.inertia)
     kept = np.maximum(values, 0.0)
@@ -96,8 +96,7 @@ def _missing(file: LintedFile) -> Iterator[RuleHit]:
         if not known & graphs.component(bonds, name) and file.element(line, "link", "body", name=name) is not None:
             yield RuleHit(
                 line,
-                f"link {name!r} moves and has no <inertial>, as others in the file have, nor has one that "
-                "is fixed to it",
+                f"link {name!r} moves without <inertial>, which other links have, and so do the links fixed to it",
             )
 
 

@@ -1,4 +1,4 @@
-"""Whether the motors of a file move the platform, and only they."""
+"""Motors of a file that do not move the platform, or more motors than its mobility."""
 
 from __future__ import annotations
 
@@ -27,9 +27,7 @@ def _few(file: LintedFile) -> Iterator[RuleHit]:
         return
     whole, rest = found.platform(), found.platform(_held_joints(robot))
     if whole and rest:
-        yield RuleHit(
-            None, f"with all motors held, the platform {robot.platform!r} keeps {rest} of its {whole} freedoms"
-        )
+        yield RuleHit(None, f"with all motors locked, the platform {robot.platform!r} keeps {rest} of its {whole} dof")
 
 
 def _many(file: LintedFile) -> Iterator[RuleHit]:
@@ -39,7 +37,7 @@ def _many(file: LintedFile) -> Iterator[RuleHit]:
     driven = sum(joint.type.freedoms for joint in robot.joints.values() if joint.actuated)
     whole, rest = found.count(), found.count(held=_held_joints(robot))
     if whole is not None and rest is not None and driven > whole - rest:
-        yield RuleHit(None, f"{driven} coordinates are driven, and {whole - rest} of them are independent")
+        yield RuleHit(None, f"{driven} coordinates have motors, but only {whole - rest} of them are independent")
 
 
 def _floating(file: LintedFile) -> Iterator[RuleHit]:
@@ -48,7 +46,7 @@ def _floating(file: LintedFile) -> Iterator[RuleHit]:
         return
     for name in robot.idle:
         if robot.joints[name].actuated:
-            yield RuleHit(None, f"motor on the floating joint {name!r}, whose link other joints hold")
+            yield RuleHit(None, f"motor on the floating joint {name!r}, whose link other joints carry")
 
 
 RULES = (
@@ -56,33 +54,33 @@ RULES = (
         "motor-none",
         "note",
         "no motor",
-        "The Type 2 singularities of the real robot depend on which joints are driven; URDF+ and plain URDF "
-        "often do not say so.",
-        "name them: one <transmission> each, or --motors JOINTS",
+        "The Type 2 singularities of the real robot depend on which joints have motors; URDF+ and plain URDF "
+        "often do not name them.",
+        "name them: a <transmission> for each, or --motors JOINTS",
         _none,
     ),
     LintRule(
         "motors-few",
         "warning",
         "motors that do not determine the platform",
-        "With all motors held the platform can still move, near the zero configuration.",
-        "name the motor that is missing, or hold or drive the joint that is left free",
+        "With all motors locked the platform can still move, near the zero configuration.",
+        "name the missing motor, or fix or actuate the free joint",
         _few,
     ),
     LintRule(
         "motors-many",
         "warning",
-        "more driven coordinates than the mechanism has",
+        "more coordinates with motors than the mobility",
         "Tools put an actuator on every joint, passive ones too. The motors then work against each other.",
-        "remove the motors of passive joints, or name the driven ones: --motors JOINTS",
+        "remove the motors of passive joints, or name the motors: --motors JOINTS",
         _many,
     ),
     LintRule(
         "motor-floating",
         "error",
-        "a motor on a floating joint whose link other joints hold",
-        "The joint holds nothing and has no coordinates of its own: commands that move the robot refuse the file.",
-        "drive the joints that hold the link, and remove this motor",
+        "a motor on a floating joint whose link other joints carry",
+        "The joint constrains nothing and has no coordinates of its own: commands that move the robot refuse the file.",
+        "put motors on the joints that carry the link, and remove this one",
         _floating,
     ),
 )

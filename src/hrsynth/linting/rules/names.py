@@ -1,4 +1,4 @@
-"""Names that other readers confuse, and links that hang on nothing."""
+"""Names that other readers confuse, and links without joints."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from ..findings import Fix, LintRule, RuleHit
 from ..linted_file import LintedFile
 
 RESERVED = re.compile(r"__.*__|world|.*::.*")
-"""Names that SDFormat keeps for itself."""
+"""Names that SDFormat reserves."""
 OWN = re.compile(rf"__[123]$|{TIP}$|{CUT}$|{END}$")
-"""Ends of the names that this program's writers give to a joint and the link that it carries."""
+"""Suffixes that hrsynth's writers give to a joint and the link that it carries."""
 
 
 def _clash(file: LintedFile) -> Iterator[RuleHit]:
-    if file.root is None or file.dialect == "mjcf":  # in which each kind has names of its own
+    if file.root is None or file.dialect == "mjcf":  # each kind has its own namespace
         return
     links = {each.get("name") for each in file.root.iter("link")}
     for joint in joints(file):
@@ -62,7 +62,7 @@ def _motors(file: LintedFile) -> Iterator[RuleHit]:
     for each in names:
         name = each.get("name") if isinstance(each.tag, str) else None
         if name is not None and name in seen:
-            yield RuleHit(xml.line(each), f"motor {name!r}: another one has this name")
+            yield RuleHit(xml.line(each), f"motor {name!r}: name already used")
         seen.add(name or "")
 
 
@@ -85,7 +85,7 @@ def _unused(file: LintedFile) -> Iterator[RuleHit]:
 
 
 def removal(file: LintedFile, element: xml.Element | None) -> Fix | None:
-    """A mend that takes an element out; None where another one names it, and would then name nothing."""
+    """Return the fix that removes an element; None if another element names it."""
     if element is None:
         return None
     name, everywhere = element.get("name"), file.remember("words", lambda: Counter(_words(file.root)))
@@ -95,13 +95,13 @@ def removal(file: LintedFile, element: xml.Element | None) -> Fix | None:
 
 
 def _words(element: xml.Element | None) -> Iterator[str]:
-    """The values of all attributes of an element and of those in it, and their texts."""
+    """Yield the values of all attributes and the texts of an element and its descendants."""
     for each in () if element is None else element.iter("*"):
         yield from (*each.attrib.values(), (each.text or "").strip())
 
 
 def _remove(element: xml.Element) -> None:
-    """Take an element out of its document, and the white space before it."""
+    """Remove an element from its document, and the white space before it."""
     parent, before = element.getparent(), element.getprevious()
     if parent is None:
         return
@@ -152,7 +152,7 @@ RULES = (
         "link-unused",
         "warning",
         "a link that no joint connects",
-        "Most readers refuse a second root; this one drops what is not connected to the base.",
+        "Most readers refuse a second root; hrsynth drops links that are not connected to the base.",
         "remove it, or add its joint",
         _unused,
         fixable=True,

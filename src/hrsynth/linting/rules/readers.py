@@ -1,8 +1,8 @@
-"""Closures that other programs do not read: which construct each of them knows, as a table.
+"""Closures that other programs do not read: a table of the constructs that each program knows.
 
-Pinocchio 4.1, MuJoCo 4.0 and yourdfpy 0.0.60 were tried (a test does it again); what is said of Gazebo is from its
-tutorial on closed loops and gz-physics issue 25, of Isaac Sim from its importer's UrdfLoopJoint. Of a program that is
-in no row of a construct nothing is known, and nothing is said.
+Pinocchio 4.1, MuJoCo 4.0 and yourdfpy 0.0.60 were tried (a test repeats it); the entries of Gazebo are from its
+tutorial on closed loops and gz-physics issue 25, those of Isaac Sim from its importer's UrdfLoopJoint. For programs
+that are in no row of a construct nothing is known, and nothing is reported.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from ...description.jointgraph import comma_list
 from ..findings import LintRule, RuleHit
 from ..linted_file import LintedFile
 
-SILENT, REFUSED, READ = "leaves it out without a word", "refuses the file", "reads it"
-TOLD = "leaves it out with a message"
-ASKED = "leaves it out but in buildModelAndConstraintsFromMJCF"
+SILENT, REFUSED, READ = "omits it silently", "refuses the file", "reads it"
+TOLD = "omits it with a message"
+ASKED = "omits it except in buildModelAndConstraintsFromMJCF"
 PROGRAMS = ("urdfdom", "pinocchio", "mujoco", "yourdfpy", "gazebo-classic", "gazebo", "drake", "isaac", "gepetto")
 _URDF_TREE = dict.fromkeys(("urdfdom", "pinocchio", "mujoco", "yourdfpy", "gazebo-classic", "gazebo", "isaac"), SILENT)
 CONSTRUCTS = {
@@ -38,12 +38,12 @@ CONSTRUCTS = {
     "equality/joint": {"mujoco": READ, "pinocchio": SILENT},
     "second joint of one child in SDFormat": {"gazebo-classic": READ, "gazebo": TOLD},
 }
-"""What each program makes of each construct."""
+"""Behaviour of each program for each construct."""
 TAGS = ("loop", "coupling", "constraint", "loop_joint", "joint", "mimic", "connect", "weld", "plugin")
 
 
 def _construct(file: LintedFile, name: str, line: int | None) -> str | None:
-    """The construct in which a file states a closure."""
+    """Return the construct of a closure in a file."""
     graph = file.said
     if graph is not None and graph.dialect == "Gepetto" and line is None:
         return "closed_loop of the YAML file"
@@ -62,7 +62,7 @@ def _construct(file: LintedFile, name: str, line: int | None) -> str | None:
 
 
 def closures(file: LintedFile) -> Iterator[tuple[str, int | None]]:
-    """Name and line of all that closes loops as the file says it."""
+    """Yield name and line of the file's loop closures and couplings."""
     graph = file.said
     if graph is None:
         return
@@ -90,24 +90,24 @@ def _dropped(file: LintedFile) -> Iterator[RuleHit]:
 
 
 def _list_deeds(known: dict[str, str]) -> str:
-    """What programs do, each deed once."""
+    """Return the programs by their behaviour as a text."""
     parts = []
     for what in (SILENT, ASKED, TOLD, REFUSED):
         names = [program for program, deed in known.items() if deed == what]
         if names:
-            plural = what.replace("leaves", "leave").replace("refuses", "refuse") if len(names) > 1 else what
+            plural = what.replace("omits", "omit").replace("refuses", "refuse") if len(names) > 1 else what
             parts.append(f"{', '.join(names)} {plural}")
     return "; ".join(parts)
 
 
 RULES = (
     LintRule(
-        "reader-drops",
+        "program-drops",
         "note",
         "a closure that other programs do not read",
-        "The file loads there as an open tree: it falls apart in simulation, and its Jacobians are those of "
+        "The file loads there as an open tree: it falls apart in simulation, and its Jacobians belong to "
         "another robot. With --program NAME only that program is considered.",
-        "write the file in a dialect that the program reads: hrsynth convert IN OUT.xml for MuJoCo, OUT.sdf for "
+        "write the file in a format that the program reads: hrsynth convert IN OUT.xml for MuJoCo, OUT.sdf for "
         "Gazebo Classic, OUT.yaml for Gepetto's tools",
         _dropped,
     ),

@@ -1,4 +1,4 @@
-"""What the readers of this program refuse, guess, solve and leave out, as findings."""
+"""Findings from reading a file: refusals, assumptions, solved loops and content that is left out."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def _refused(file: LintedFile) -> Iterator[RuleHit]:
     error = file.refusal
     if error is None or isinstance(error, BadRequest):
         return
-    if isinstance(error, LoopsNotClosed) and error.residual > NOISE:  # a rule of its own tells it
+    if isinstance(error, LoopsNotClosed) and error.residual > NOISE:  # another rule reports it
         return
     for line, text in defects_of(error):
         yield RuleHit(line, text)
@@ -30,7 +30,7 @@ def _asks(file: LintedFile) -> Iterator[RuleHit]:
 
 
 def find_notes(*kinds: str, text: str = "") -> Callable[[LintedFile], Iterator[RuleHit]]:
-    """What finds the reader's notes of some kinds whose text begins with a pattern."""
+    """Return a function that yields the reader's notes of some kinds whose text begins with a pattern."""
 
     def find(file: LintedFile) -> Iterator[RuleHit]:
         robot = file.mechanism
@@ -41,67 +41,69 @@ def find_notes(*kinds: str, text: str = "") -> Callable[[LintedFile], Iterator[R
     return find
 
 
-_unread = find_notes("open", text=r"(?!\d+ coordinates are driven|the robot's char|nothing in the file closes)")
-_left_out = find_notes("ignored", text=r"(?!\d+ links that no joint|unknown (element|attribute))")  # they have rules
+_unread = find_notes("open", text=r"(?!\d+ coordinates have motors|the robot's char|no element of the file closes)")
+_left_out = find_notes(
+    "ignored", text=r"(?!\d+ links that no joint|unknown (element|attribute))"
+)  # these have rules of their own
 
 
 RULES = (
     LintRule(
         "refused",
         "error",
-        "what this program refuses to read",
-        "Every command answers this file with this message.",
-        "correct what the message says",
+        "content that hrsynth refuses",
+        "Every command refuses this file with this message.",
+        "correct the defect in the message",
         _refused,
     ),
     LintRule(
-        "unsaid",
+        "option-missing",
         "warning",
-        "what the file does not say, and its structure does not show",
+        "information that neither the file nor its structure gives",
         "Commands need it as an option.",
         "give the option named in the message",
         _asks,
     ),
     LintRule(
-        "guessed",
+        "assumed",
         "note",
-        "what the file does not say, guessed from its structure",
-        "A guess is made only where the structure leaves one choice; the answer still depends on it.",
-        "say it in the file, or with the option named in the message",
-        find_notes("guess"),
+        "an assumption from the structure of the file",
+        "An assumption is made only if the structure leaves one choice; the results depend on it.",
+        "state it in the file, or with the option named in the message",
+        find_notes("assumption"),
     ),
     LintRule(
         "ignored",
         "warning",
-        "what the reader leaves out",
-        "No answer takes it into account.",
-        "remove it, or correct the name that it gives",
+        "content that the reader leaves out",
+        "No result takes it into account.",
+        "remove it, or correct the name in it",
         _left_out,
     ),
     LintRule(
         "closure-unread",
         "warning",
-        "what may close a loop and is not read",
-        "Simulator plugins and elements that hold links together, but about which the file does not say enough.",
-        "close the loop as the message says",
+        "a possible loop closure that is not read",
+        "Simulator plugins and elements that connect links, but with incomplete data.",
+        "close the loop with the option in the message",
         _unread,
     ),
     LintRule(
         "merged",
         "note",
-        "what is read as something else",
-        "Closures and joints that stand for one joint are read as that joint, and relations that hold up to "
+        "elements that are read as an equivalent",
+        "Closures and joints that are equivalent to one joint are read as that joint, and relations that hold up to "
         "printed digits are corrected.",
-        "nothing, if that is intended",
+        "nothing, if this is intended",
         find_notes("merged", text=rf"(?!{ROUNDED.pattern})"),
     ),
     LintRule(
         "zero-singular",
         "warning",
         "a singular zero configuration",
-        "Ranks at that pose differ from those nearby: motors are at a dead point, or the loops gain a freedom. "
-        "This program uses a nearby pose as zero.",
-        "choose another zero configuration (hrsynth convert writes the one that is used)",
-        find_notes("solved", text="the zero pose"),
+        "Ranks there differ from those nearby: motors are at a dead point, or the loops gain mobility. "
+        "hrsynth uses a nearby configuration as zero.",
+        "choose another zero configuration (hrsynth convert writes the one in use)",
+        find_notes("solved", text="the zero configuration"),
     ),
 )

@@ -1,4 +1,4 @@
-"""Numbers that are right in another unit: degrees, millimetres, axes that are not of length one."""
+"""Numbers in a wrong unit: degrees, millimetres, axes whose length is not one."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from ..linted_file import LintedFile
 
 
 def in_degrees(value: float | None) -> bool:
-    """Whether an angle that should be in radians looks like one in degrees."""
+    """Return True if an angle that should be in radians looks like one in degrees."""
     return value is not None and TURN_IN_RADIANS < abs(value) <= 360 and value % IN_DEGREES == 0
 
 
 def _in_radians(value: float | None) -> bool:
-    """Whether an angle looks like a simple part of a turn in radians, as it is printed."""
+    """Return True if an angle looks like a rounded simple fraction of a full rotation in radians."""
     steps = round((value or 0.0) / numerals.SIMPLE_ANGLE)
     return (
         value is not None
@@ -33,7 +33,7 @@ def _in_radians(value: float | None) -> bool:
 
 
 def _convert(numbers: list[NumberAt]) -> Fix | None:
-    """All of them in radians; None where some are in these, so that nobody knows what the others are."""
+    """Return the fix that writes all in radians; None if some already are, as the units are then unknown."""
     if any(_in_radians(each.value) for each in numbers):
         return None
 
@@ -45,7 +45,7 @@ def _convert(numbers: list[NumberAt]) -> Fix | None:
 
 
 def _limits(file: LintedFile) -> Iterator[RuleHit]:
-    if file.dialect == "mjcf":  # in which degrees are the default
+    if file.dialect == "mjcf":  # degrees are its default
         return
     every = [
         (each, [end for end in (each.lower, each.upper) if end is not None]) for each in limits(file) if each.turns
@@ -56,7 +56,7 @@ def _limits(file: LintedFile) -> Iterator[RuleHit]:
         sure = any(in_degrees(end.value) for end in ends)
         if sure or (whole and any(end.value for end in ends)):
             values = " to ".join(str(end.text) for end in ends)
-            beside = "" if sure else ", beside others that look like degrees"
+            beside = "" if sure else ", among others that look like degrees"
             yield RuleHit(xml.line(each.element), f"joint {each.joint!r}: limits {values} rad{beside}", _convert(ends))
 
 
@@ -72,7 +72,7 @@ def _angles(file: LintedFile) -> Iterator[RuleHit]:
 
 
 def _turns(file: LintedFile) -> Iterator[tuple[str, xml.Element, list[NumberAt]]]:
-    """All roll, pitch, yaw that a document gives in radians: what has them, where they stand."""
+    """Yield all roll, pitch, yaw of a document in radians: owner, element, numbers."""
     for element in file.root.iter() if file.root is not None else ():
         if file.dialect == "urdf" and isinstance(element.tag, str):
             count = len((element.get("rpy") or "").split())
@@ -94,9 +94,11 @@ def _length(file: LintedFile) -> Iterator[RuleHit]:
     if robot is None:
         return
     if robot.length > LARGEST_ROBOT:
-        yield RuleHit(None, f"the joints are {robot.length:.3g} m from their middle on average: are these millimetres?")
+        yield RuleHit(
+            None, f"the joints are {robot.length:.3g} m from their centroid on average, perhaps in millimetres"
+        )
     elif robot.length < SMALLEST_ROBOT:
-        yield RuleHit(None, f"the joints are {robot.length:.3g} m from their middle on average")
+        yield RuleHit(None, f"the joints are {robot.length:.3g} m from their centroid on average")
 
 
 def _axis(file: LintedFile) -> Iterator[RuleHit]:
@@ -139,7 +141,7 @@ RULES = (
         "unit-limits",
         "warning",
         "limits that look like degrees",
-        "URDF and SDFormat use radians: 90 is fourteen turns, so the limit has no effect.",
+        "URDF and SDFormat use radians: 90 rad is 14.3 rotations, so the limit has no effect.",
         "convert them to radians",
         _limits,
         fixable=True,
@@ -148,7 +150,7 @@ RULES = (
         "unit-angles",
         "warning",
         "roll, pitch, yaw that look like degrees",
-        "URDF and SDFormat use radians: 90 is fourteen turns and a bit, so the frame is turned by 116 degrees.",
+        "URDF and SDFormat use radians: 90 rad is 14.3 rotations, so the frame is rotated by 116 degrees.",
         "convert them to radians",
         _angles,
         fixable=True,
@@ -156,9 +158,9 @@ RULES = (
     LintRule(
         "unit-length",
         "warning",
-        "a robot as large as a house, or as small as a grain",
+        "an implausible size of the robot",
         "Modelling tools export millimetres, readers expect metres.",
-        "scale it, or give --unit mm to every command",
+        "scale it, or use --unit mm with every command",
         _length,
     ),
     LintRule(
@@ -173,7 +175,7 @@ RULES = (
         "axis-length",
         "note",
         "an axis whose length is not one",
-        "This program and most others use only its direction; some scale the joint's speed by its length.",
+        "hrsynth and most programs use only its direction; some scale the joint's speed by its length.",
         "divide it by its length",
         _axis,
         fixable=True,

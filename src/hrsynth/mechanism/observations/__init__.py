@@ -1,4 +1,4 @@
-"""The kinds of observations: one file each. What lies here is found by itself."""
+"""Kinds of observations: one file each, discovered automatically."""
 
 from __future__ import annotations
 
@@ -11,6 +11,6 @@ from ..observation import Observation
 
 @cache
 def kinds() -> dict[str, type[Observation]]:
-    """All kinds by their words, in the order of their files' names."""
+    """Return all kinds by name, in the order of their files' names."""
     found = (import_module(f"{__name__}.{module.name}").KIND for module in iter_modules(__path__))
     return {kind.kind: kind for kind in found}

@@ -30,7 +30,7 @@ from ..observation import Drawn
 
 
 def circle_chain(at: ViewGeometry, leg: str) -> tuple[VirtualJoint, ...]:
-    """U̲P̲-U̲-R: five motors, R about the normal."""
+    """Return U̲P̲-U̲-R: five motors, R about the normal."""
     apart(at, at.B, 0.0, f"circle {leg!r}", "a centre outside of it")
     return (
         gimbal(at.C, at.ray, at.far, actuated=True),
@@ -41,7 +41,7 @@ def circle_chain(at: ViewGeometry, leg: str) -> tuple[VirtualJoint, ...]:
 
 
 def circle_wrenches(at: ViewGeometry) -> list[Numbers]:
-    """Three forces at the centre, two moments normal to d."""
+    """Return three forces at the centre, two moments normal to d."""
     return [force(e, at.B) for e in np.eye(3, dtype=int).astype(at.B.dtype)] + [couple(n) for n in normals(at.d)]
 
 
@@ -76,14 +76,14 @@ class SpaceCircle(CameraObservation):
         return [a - b for a, b in zip([*p, *d], wanted.tolist(), strict=True)]
 
     def sense(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
-        """The centre beside its place, the normal in a cone."""
+        """Return the centre with an error, the normal in a cone."""
         return np.concatenate(
             [value[:3] + noise.get("m", 0.0) * shocks[0], tilt_vector(value[3:], shocks[1], noise.get("rad", 0.0))]
         )
 
     @staticmethod
     def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
-        """The ray to its centre, a circle about it and its normal."""
+        """Return the ray to its centre, a circle about it and its normal."""
         return Drawn((np.array([0 * p, p]), ring(p, d, size / 2), np.array([p, p + size / 2 * d])))
 
     @staticmethod

@@ -45,7 +45,7 @@ class PointDepth(MetricPoint):
 
     @staticmethod
     def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
-        """Along the camera's z axis, then across to the point."""
+        """Return a line along the camera's z axis, then across to the point."""
         foot = np.array([0, 0, p[2]])
         return Drawn((np.array([0 * p, foot, p]),))
 

@@ -21,7 +21,7 @@ from ..observation import Observation, ObservationRecord
 
 
 def axis_chain(at: ViewGeometry) -> tuple[VirtualJoint, ...]:
-    """PPP-U̲-R(d): T only translates relative to the reference link, so the first axis of U̲ keeps its direction
+    """Return PPP-U̲-R(d): T only translates relative to the reference link, so the first axis of U̲ keeps its direction
     there."""
     turning = gimbal(at.B, at.d, at.far, actuated=True)
     first, second = turning.axes
@@ -31,7 +31,7 @@ def axis_chain(at: ViewGeometry) -> tuple[VirtualJoint, ...]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SeenAxis(Observation):
-    """The unit vector u = R_cᵀ R_ℓ d of a direction d fixed in link ℓ (docs/pages/theory.md, section 2; MMT 2.3.1).
+    """Unit vector u = R_cᵀ R_ℓ d of a direction d fixed in link ℓ (docs/pages/theory.md, section 2; MMT 2.3.1).
 
     ``direction`` is d in the *link's* frame, shape (3,).
     """
@@ -53,16 +53,16 @@ class SeenAxis(Observation):
             raise BadMechanism(f"observation of leg {self.leg!r}: direction", "0 0 0", "a non-zero vector") from None
 
     def value(self, X_reference: Array, X_link: Array) -> Array:
-        """u, shape (3,), a unit vector in the reference link's frame."""
+        """Return u, shape (3,), a unit vector in the reference link's frame."""
         return X_reference[:3, :3].T @ X_link[:3, :3] @ self.direction
 
     def rate(self, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array) -> Array:
-        """u̇ = R_cᵀ ((ω_ℓ − ω_c) × R_ℓ d), shape (3, n)."""
+        """Return u̇ = R_cᵀ ((ω_ℓ − ω_c) × R_ℓ d), shape (3, n)."""
         u = X_link[:3, :3] @ self.direction
         return (X_reference[:3, :3].T @ -hat(u)) @ (V_link[3:] - V_reference[3:])
 
     def error(self, value: Array, wanted: Array) -> Array:
-        """u × u* (MMT eq. 9): it vanishes for the opposite direction too."""
+        """Return u × u* (MMT eq. 9): it vanishes for the opposite direction too."""
         return np.asarray(cross(value, wanted))
 
     def error_slope(self, value: Array, wanted: Array) -> Array:
@@ -70,7 +70,7 @@ class SeenAxis(Observation):
         return -hat(wanted)
 
     def sense(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
-        """In a cone about u."""
+        """Return a direction in a cone about u."""
         return tilt_vector(value, shocks[0], noise["rad"])
 
     @classmethod
@@ -90,15 +90,15 @@ class SeenAxis(Observation):
 
     @property
     def view(self) -> Array:
-        """The frame in which the value is told (4, 4), in the reference link's."""
+        """Frame of the value (4, 4), in the reference link's."""
         return frozen(np.eye(4))
 
     def sighting(self, X_reference: Array, X_link: Array, far: Array | None = None) -> ViewGeometry:
-        """Where links and axis are, in the base frame."""
+        """Return the geometry of links and axis in the base frame."""
         return ViewGeometry(X_reference[:3, 3], X_reference[:3, 2], X_link[:3, 3], X_link[:3, :3] @ self.direction, far)
 
     def wrenches(self, at: ViewGeometry) -> list[Numbers]:
-        """Two moments normal to u."""
+        """Return two moments normal to u."""
         return [couple(n) for n in normals(at.d)]
 
     def chain(self, at: ViewGeometry) -> tuple[VirtualJoint, ...]:
@@ -109,7 +109,7 @@ class SeenAxis(Observation):
         return (turned_across(at.d, *normals(at.d)),)
 
     def pointing(self, values: Array) -> Array | None:
-        """Of values (n, 3), what the chain's first U turns: all."""
+        """Return the part of values (n, 3) that the chain's first U rotates: all."""
         return values
 
     def carried_by(self, into: Mapping[str, str], poses: Mapping[str, Array]) -> Self:
@@ -130,7 +130,7 @@ class SeenAxis(Observation):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Direction(SeenAxis):
-    """The direction of a segment, or of any axis of a link."""
+    """Direction of a segment, or of any axis of a link."""
 
     kind = "direction"
     words = "the direction of an axis, u"
@@ -143,7 +143,7 @@ class Direction(SeenAxis):
 
 @lru_cache(maxsize=512)
 def _directions(observations: tuple[Observation, ...]) -> Array:
-    """The directions (k, 3, 1) of observations, in their links."""
+    """Return the directions (k, 3, 1) of observations, in their links."""
     return frozen([o.direction[:, None] for o in observations if isinstance(o, SeenAxis)])
 
 

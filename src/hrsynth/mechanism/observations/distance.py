@@ -43,7 +43,7 @@ class PointDistance(MetricPoint):
 
     @staticmethod
     def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
-        """The ray, and arcs of the sphere at its end."""
+        """Return the ray, and arcs of the sphere at its end."""
         arcs = (ring(0 * p, unit(across), float(np.linalg.norm(p))) for across in normals(unit(p)))
         near = (arc[arc @ unit(p) > np.cos(0.2) * np.linalg.norm(p)] for arc in arcs)
         return Drawn((np.array([0 * p, p]), *(np.array(sorted(arc, key=tuple)) for arc in near if len(arc) > 1)))

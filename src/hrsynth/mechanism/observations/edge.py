@@ -19,13 +19,13 @@ from ..images import SeenLine, line_fed
 
 
 def tangent(p: Array, d: Array, r: Array) -> Array:
-    """n with n · d = 0, n · p = r, ‖n‖ = 1: the plane of normal n through C touches the cylinder; of the two the one
-    with n · (d × p) > 0. A negative r gives (with −n) the other plane. Raises ``UndefinedValue`` where C is inside."""
+    """Return n with n · d = 0, n · p = r, ‖n‖ = 1: the plane of normal n through C touches the cylinder; of the two the
+    one with n · (d × p) > 0. A negative r gives (with −n) the other plane. Raises ``UndefinedValue`` if C is inside."""
     f = p - np.sum(p * d, axis=-1, keepdims=True) * d
     D = np.linalg.norm(f, axis=-1, keepdims=True)
     if not np.all(np.abs(r) < D):
         raise UndefinedValue(
-            "an edge of a cylinder: distance of its axis from the camera's centre (m)",
+            "an edge of a cylinder: distance of its axis from the camera centre (m)",
             float(D.min()),
             f"more than its radius {float(np.abs(r).max()):g}",
         )
@@ -33,7 +33,7 @@ def tangent(p: Array, d: Array, r: Array) -> Array:
 
 
 def touching(p: Sequence[Jet], d: Sequence[Jet], r: Jet) -> list[Jet]:
-    """The same of any length, with derivatives."""
+    """Return the normal, of any length, with derivatives."""
     along = components.dot(p, d)
     foot = [a - along * b for a, b in zip(p, d, strict=True)]
     high = (components.dot(foot, foot) - r * r).sqrt()
@@ -41,7 +41,7 @@ def touching(p: Sequence[Jet], d: Sequence[Jet], r: Jet) -> list[Jet]:
 
 
 def tangent_partials(p: Array, d: Array, r: Array) -> tuple[Array, Array]:
-    """∂n/∂p and ∂n/∂d, (…, 3, 3): ṅ · d = −n · ḋ, ṅ · p = −n · ṗ, ṅ · n = 0."""
+    """Return ∂n/∂p and ∂n/∂d, (…, 3, 3): ṅ · d = −n · ḋ, ṅ · p = −n · ṗ, ṅ · n = 0."""
     n = tangent(p, d, r)
     solved = np.linalg.inv(np.stack(np.broadcast_arrays(d, p, n), axis=-2))
     return -solved[..., 1:2] * n[..., None, :], -solved[..., 0:1] * n[..., None, :]
@@ -49,8 +49,8 @@ def tangent_partials(p: Array, d: Array, r: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CylinderEdge(SeenLine):
-    """The normal n of a plane through C that touches the cylinder of axis (B, d); the sign of ``radius`` says which of
-    the two (MMT eq. 3-4)."""
+    """Normal n of a plane through C that touches the cylinder of axis (B, d); the sign of ``radius`` selects one of the
+    two (MMT eq. 3-4)."""
 
     kind = "edge"
     words = "an edge of a cylinder of known radius: its tangent plane through C"
@@ -77,7 +77,7 @@ class CylinderEdge(SeenLine):
 
     @staticmethod
     def suppose_plane(p: Array, d: Array, r: Array, g: Array) -> tuple[Array, Array]:
-        """The axis of the cylinder that is touched where the plane of the edge meets that of g."""
+        """Return the axis of the cylinder that is touched where the plane of the edge meets that of g."""
         n = tangent(p, d, r)
         foot = on_plane(n, g)
         return foot + r * n, normalise_rates(cross(foot, n))[0]

@@ -56,7 +56,7 @@ class CylinderEdges(CameraObservation):
         return slope
 
     def sense(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
-        """Each edge through two image points beside it."""
+        """Return each edge through two image points near it."""
         by = self.pixels(noise)
         return np.concatenate(
             [shifted_line(n, shock, by) for n, shock in zip((value[:3], value[3:]), shocks, strict=True)]
@@ -64,7 +64,7 @@ class CylinderEdges(CameraObservation):
 
     @staticmethod
     def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
-        """Both tangent planes."""
+        """Return both tangent planes."""
         both = [CylinderEdge.outline(p, d, sign * r, size) for sign in (1, -1)]
         return Drawn(both[0].lines + both[1].lines, both[0].areas + both[1].areas)
 

@@ -1,4 +1,4 @@
-"""A joint's coordinate, read by an encoder: the one kind whose chain is the real joint, actuated."""
+"""Coordinate of a joint, measured by an encoder: the only kind whose chain is the real joint, actuated."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..observation import Drawn, Observation, ObservationRecord
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Encoder(Observation):
-    """One coordinate of a joint: the motion of ``link`` seen from ``seen_from``, the joint's other link.
+    """Encoder of one coordinate of a joint: the motion of ``link`` relative to ``seen_from``, the joint's other link.
 
     ``axis`` is the joint's axis in the frame of ``seen_from``, shape (3,).
     """
@@ -28,7 +28,7 @@ class Encoder(Observation):
     needs = ("joint",)
     size = 1
     rank = 1
-    feature_error = "y − y*, of angles without whole turns"
+    feature_error = "y − y*, of angles without full rotations"
     joint: str
     axis: Array
 
@@ -42,7 +42,7 @@ class Encoder(Observation):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AngleEncoder(Encoder):
-    """The angle by which a direction fixed in the link has turned about the axis since the zero configuration.
+    """Encoder of the angle about the axis since the zero configuration of a direction fixed in the link.
 
     ``mark`` is that direction in the link's frame, ``start`` the same at zero in the frame of ``seen_from``, both (3,)
     and not parallel to the axis: any normal of it for R and C, the other axis for U.
@@ -60,20 +60,20 @@ class AngleEncoder(Encoder):
         return replace(super().carried_by(into, poses), axis=axis, mark=R @ self.mark, start=start)
 
     def value(self, X_reference: Array, X_link: Array) -> Array:
-        """The angle, shape (1,), in (−π, π]."""
+        """Return the angle, shape (1,), in (−π, π]."""
         mark = X_reference[:3, :3].T @ X_link[:3, :3] @ self.mark
         normal = self.start - (self.axis @ self.start) * self.axis
         return np.array([np.arctan2(self.axis @ cross(normal, mark), normal @ mark)])
 
     def difference(self, value: Array, wanted: Array) -> Array:
-        """The difference without whole turns: at half a turn the angle is π as well as −π."""
+        """Return the difference without full rotations: at 180 degrees the angle is π as well as −π."""
         return np.array([wrap_angle(float(value[0] - wanted[0]))])
 
     def sense(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
         return value + noise["rad"] * shocks[0, :1]
 
     def draw(self, X_reference: Array, X_link: Array, size: float) -> Drawn:
-        """An arc about the axis, at the link's frame, from where its mark was at zero to where it is."""
+        """Return an arc about the axis, at the link's frame, from its mark at zero to its mark now."""
         turn, R = float(self.value(X_reference, X_link)[0]), X_reference[:3, :3]
         spoke = unit(self.start - (self.axis @ self.start) * self.axis)
         turns = np.linspace(0, turn, 17)[:, None]
@@ -81,7 +81,8 @@ class AngleEncoder(Encoder):
         return Drawn((X_link[:3, 3] + size / 2 * np.vstack([np.zeros(3), arc, np.zeros(3)]) @ R.T,))
 
     def rate(self, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array) -> Array:
-        """a* · (ω_ℓ − ω_c), shape (1, n); a* = (a − c m) / (1 − c²), c = a · m: dual to the axis a and the mark m."""
+        """Return a* · (ω_ℓ − ω_c), shape (1, n); a* = (a − c m) / (1 − c²), c = a · m: dual to the axis a and the mark
+        m."""
         axis, mark = X_reference[:3, :3] @ self.axis, X_link[:3, :3] @ self.mark
         cosine = float(axis @ mark)
         return ((axis - cosine * mark) / (1 - cosine**2))[None] @ (V_link[3:] - V_reference[3:])
@@ -89,7 +90,7 @@ class AngleEncoder(Encoder):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SlideEncoder(Encoder):
-    """The length by which the link has slid along the axis since the zero configuration.
+    """Encoder of the displacement along the axis since the zero configuration.
 
     ``point`` is the joint's centre in the link's frame, ``start`` the same at zero in the frame of ``seen_from``, (3,).
     """
@@ -105,7 +106,7 @@ class SlideEncoder(Encoder):
         return replace(super().carried_by(into, poses), axis=axis, point=transform(X, self.point), start=start)
 
     def value(self, X_reference: Array, X_link: Array) -> Array:
-        """The length, shape (1,), in metres."""
+        """Return the length, shape (1,), in metres."""
         arm = transform(X_link, self.point) - X_reference[:3, 3]
         return np.array([self.axis @ (X_reference[:3, :3].T @ arm - self.start)])
 
@@ -113,11 +114,11 @@ class SlideEncoder(Encoder):
         return value + noise["m"] * shocks[0, :1]
 
     def draw(self, X_reference: Array, X_link: Array, size: float) -> Drawn:
-        """The way since zero."""
+        """Return the segment since zero."""
         return Drawn((np.array([transform(X_reference, self.start), transform(X_link, self.point)]),))
 
     def rate(self, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array) -> Array:
-        """a · (velocity of the centre as one link carries it − as the other does), shape (1, n)."""
+        """Return a · (velocity of the centre on one link − on the other), shape (1, n)."""
         centre = transform(X_link, self.point)
         slip = point_velocity(V_link, centre - X_link[:3, 3]) - point_velocity(V_reference, centre - X_reference[:3, 3])
         return (X_reference[:3, :3] @ self.axis)[None] @ slip

@@ -24,25 +24,25 @@ WEIGHTS = np.sqrt([1.0, 1, 1, 2, 2, 2])
 
 
 def cone(p: Array, d: Array, r: Array) -> Array:
-    """The symmetric matrix (…, 3, 3) of the cone from C over the circle: (p·d)² I − (p·d)(p dᵀ + d pᵀ) +
-    (p·p − r²) d dᵀ."""
+    """Return the symmetric matrix (…, 3, 3) of the cone from C over the circle: (p·d)² I − (p·d)(p dᵀ + d pᵀ) + (p·p −
+    r²) d dᵀ."""
     h = dot(p, d)[..., None, None]
     return np.asarray(h**2 * np.eye(3) - h * _both(p, d) + (dot(p, p)[..., None] - r**2)[..., None] * _both(d, d) / 2)
 
 
 def _both(a: Array, b: Array) -> Array:
-    """a bᵀ + b aᵀ."""
+    """Return a bᵀ + b aᵀ."""
     product = a[..., :, None] * b[..., None, :]
     return np.asarray(product + np.swapaxes(product, -1, -2))
 
 
 def _entries_of(Q: Array) -> Array:
-    """The six entries of symmetric matrices, their norm that of the matrix."""
+    """Return the six entries of symmetric matrices, their norm that of the matrix."""
     return np.asarray(Q[..., ROWS, COLUMNS] * WEIGHTS)
 
 
 def _matrix(entries: Array) -> Array:
-    """The symmetric matrices of such entries."""
+    """Return the symmetric matrices of such entries."""
     Q = np.zeros((*entries.shape[:-1], 3, 3))
     Q[..., ROWS, COLUMNS] = Q[..., COLUMNS, ROWS] = entries / WEIGHTS
     return Q
@@ -50,14 +50,14 @@ def _matrix(entries: Array) -> Array:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ImageCircle(CameraObservation):
-    """The cone of rays to the circle (centre B, normal d), a symmetric matrix of norm 1, p from C to B.
+    """Cone of rays to the circle (centre B, normal d), a symmetric matrix of norm 1, p from C to B.
 
-    Five numbers, but three where C lies on the circle's axis, and two in its plane (a double line).
+    Five numbers, but three if C is on the circle's axis, and two in its plane (a double line).
     """
 
     kind = "image_circle"
     words = "a circle of known radius in the image: its conic"
-    locked = "as `circle`; two less where C is on its axis, three in its plane"
+    locked = "as `circle`; two less if C is on its axis, three less in its plane"
     needs = ("at", "axis", "radius")
     size = 6
     rank = 5
@@ -78,7 +78,8 @@ class ImageCircle(CameraObservation):
         q = entries[..., None] / norm
 
         def rates(other: Array, own: Array, rest: Array) -> Array:
-            """The derivatives by one of p and d, ``other`` being the second; ``rest`` is that of (p·p − r²) d dᵀ."""
+            """Return the derivatives by one of p and d, ``other`` being the second; ``rest`` is that of (p·p − r²) d
+            dᵀ."""
             columns = []
             for k, e in enumerate(np.eye(3)):
                 turned = other[..., k, None, None]
@@ -112,19 +113,19 @@ class ImageCircle(CameraObservation):
         return np.stack([ellipse_slope(Q, np.broadcast_to(_matrix(e), Q.shape)) for e in np.eye(6)], axis=-1)
 
     def in_front(self, X_reference: Array, X_link: Array) -> float:
-        """That of its point with the smallest depth, over the distance of the centre."""
+        """Return that of its point with the smallest depth, over the distance of the centre."""
         at = self.sighting(X_reference, X_link)
         reach = abs(self.radius or 0.0) * np.sqrt(max(0.0, 1 - float(at.z @ at.d) ** 2))
         return self.ahead(X_reference, X_link) - float(reach / np.linalg.norm(at.B - at.C))
 
     def sense(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
-        """Through five image points beside the ellipse."""
+        """Return the ellipse through five image points near it."""
         entries = _entries_of(shifted_ellipse(_matrix(value), shocks, self.pixels(noise)))
         return np.asarray(entries / np.linalg.norm(entries))
 
     @staticmethod
     def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
-        """The circle, and eight rays to it."""
+        """Return the circle, and eight rays to it."""
         around = ring(p, d, r)
         return Drawn((around, *(np.array([0 * p, each]) for each in around[: -1 : RING // 8])))
 

@@ -45,7 +45,7 @@ class ImageLine(SeenLine):
 
     @staticmethod
     def suppose_plane(p: Array, d: Array, r: Array, g: Array) -> tuple[Array, Array]:
-        """Where the plane of C and the line meets that of g."""
+        """Return the line in which the plane of C and the line meets that of g."""
         n = normalise_rates(cross(p, d))[0]
         foot = on_plane(n, g)
         return foot, normalise_rates(cross(n, foot))[0]

@@ -1,6 +1,6 @@
-"""The inclination of a link, as an IMU at rest on it tells: the direction of the vertical, seen from the link.
+"""Inclination of a link, measured by a stationary IMU on it: the direction of the vertical, relative to the link.
 
-link –P–P–P– T –U̲– W –R(d)– base        (as `direction`, the link is the reference; its yaw is never seen)
+link –P–P–P– T –U̲– W –R(d)– base (as `direction`, the link is the reference; its yaw is never observed)
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from .direction import SeenAxis
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Inclination(SeenAxis):
-    """The unit vector R_ℓᵀ R_0 d: ``seen_from`` is the link ℓ with the IMU, ``link`` the base, d its vertical."""
+    """Unit vector R_ℓᵀ R_0 d: ``seen_from`` is the link ℓ with the IMU, ``link`` the base, d its vertical."""
 
     kind = "inclination"
-    words = "the direction of the base's vertical in a link: an IMU at rest on it"
+    words = "the direction of the base's vertical in a link: a stationary IMU on it"
     needs = ("axis?",)
 
     @property
@@ -27,7 +27,7 @@ class Inclination(SeenAxis):
         return (self.leg, str(self.seen_from), self.kind)
 
     def draw(self, X_reference: Array, X_link: Array, size: float) -> Drawn:
-        """The vertical, from the frame of the link with the IMU."""
+        """Return the vertical, from the frame of the link with the IMU."""
         start = X_reference[:3, 3]
         return Drawn((np.array([start, start + size * X_link[:3, :3] @ self.direction]),))
 

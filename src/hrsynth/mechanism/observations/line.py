@@ -32,7 +32,7 @@ from ..observation import Drawn
 
 
 def line_chain(at: ViewGeometry) -> tuple[VirtualJoint, ...]:
-    """U̲R̲P̲-C; P̲P̲-U̲-C at the point where the line cuts a fixed plane where it meets C."""
+    """Return U̲R̲P̲-C; if the line meets C, P̲P̲-U̲-C at its point in a fixed plane."""
     away = at.foot - at.C
     if np.linalg.norm(away) > LINE_AT_CENTRE:
         return across(at, np.cross(unit(away), at.d), unit(away), 3)
@@ -47,7 +47,7 @@ def line_chain(at: ViewGeometry) -> tuple[VirtualJoint, ...]:
 class SpaceLine(CameraObservation):
     """(d, h), h = p × d the moment of the line (B, d) about C (its Plücker coordinates; MMT 5.3), p from C to B.
 
-    h is taken, and not the unit normal of the plane of C and the line, as that does not exist where the line meets C.
+    h replaces the unit normal of the plane of C and the line, which does not exist if the line meets C.
     """
 
     kind = "line"
@@ -75,14 +75,14 @@ class SpaceLine(CameraObservation):
         return [a - b for a, b in zip([*d, *components.cross(p, d)], wanted.tolist(), strict=True)]
 
     def sense(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
-        """Its point nearest to C beside its place, its direction in a cone."""
+        """Return its point nearest to C with an error, its direction in a cone."""
         d, h = value[:3], value[3:]
         turned = tilt_vector(d, shocks[1], noise.get("rad", 0.0))
         return np.concatenate([turned, cross(cross(d, h) + noise.get("m", 0.0) * shocks[0], turned)])
 
     @staticmethod
     def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
-        """A piece of the line, and the way to it from C."""
+        """Return a segment of the line, and the perpendicular to it from C."""
         return Drawn((stretch(p, d, size), np.array([0 * p, p - (p @ d) * d])))
 
     @staticmethod
@@ -104,12 +104,12 @@ class SpaceLine(CameraObservation):
 
 
 def line_loci(at: ViewGeometry) -> tuple[FixedValueLocus, ...]:
-    """A point on the line, and its direction."""
+    """Return a point on the line, and its direction."""
     return kept_in(at.B, at.B, *normals(at.d)), turned_across(at.d, *normals(at.d))
 
 
 def line_wrenches(at: ViewGeometry) -> list[Numbers]:
-    """Two forces and two moments normal to d, at the line."""
+    """Return two forces and two moments normal to d, at the line."""
     return [wrench for n in normals(at.d) for wrench in (force(n, at.B), couple(n))]
 
 

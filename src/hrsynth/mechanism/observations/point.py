@@ -49,12 +49,12 @@ class ImagePoint(CameraObservation):
 
     @staticmethod
     def plane(p: Array, d: Array, r: Array) -> Array | None:
-        """z = Z, parallel to the picture."""
+        """Return z = Z, parallel to the image plane."""
         return depth_plane(p[..., 2:])
 
     @staticmethod
     def suppose_plane(p: Array, d: Array, r: Array, g: Array) -> tuple[Array, Array]:
-        """Where the ray meets the plane."""
+        """Return the intersection of the ray with the plane."""
         return p / dot(g, p)[..., None], d
 
     @staticmethod
@@ -72,7 +72,7 @@ class ImagePoint(CameraObservation):
         return self.ahead(X_reference, X_link)
 
     def sense(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
-        """The image point beside its place, or the ray in a cone."""
+        """Return the image point with an error, or the ray in a cone."""
         if "px" in noise:
             return shifted_point(value, shocks[0], self.pixels(noise))
         return tilt_vector(value, shocks[0], noise["rad"])

@@ -54,7 +54,7 @@ class PointPosition(MetricPoint):
 
     @staticmethod
     def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
-        """The ray, and a cross of the camera's axes at its end."""
+        """Return the ray, and a cross of the camera's axes at its end."""
         return Drawn((np.array([0 * p, p]), *(stretch(p, e, size / 4) for e in np.eye(3))))
 
     def wrenches(self, at: ViewGeometry) -> list[Numbers]:

@@ -30,7 +30,7 @@ def lint(found: Lint) -> str:
         if each.advice is not None and advice not in told:
             told.add(advice)
             lines.append(f"    → {each.advice}{' (--fix does it)' if each.fixable else ''}")
-    lines += [f"{each.where}: mended: {each.message} [{each.rule}]" for each in found.mended]
+    lines += [f"{each.where}: mended: {each.message} [{each.rule}]" for each in found.fixed]
     if found.written is not None:
         lines.append(f"The mended file is written to {found.written}.")
     return "\n".join([*lines, found.headline()])

@@ -167,7 +167,7 @@ def view(
     notes: tuple[str, ...] = ()
     if isinstance(robot, Mechanism) and robot.open_platform and not hidden:
         notes = (f"the sliders move link {robot.platform!r}: {robot.choice}",)
-        robot = replace(robot, choice=PlatformChoice("guess", "the first that could be"))
+        robot = replace(robot, choice=PlatformChoice("assumption", "the first that could be"))
     setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed, blind=not hidden)
     derivation = derive(setup, seed=seed) if hidden else None
     other = None if derivation is None else derivation.hidden

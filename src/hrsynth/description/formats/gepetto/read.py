@@ -1,4 +1,4 @@
-"""From a URDF file and the YAML file beside it to a joint graph."""
+"""Joint graph from a URDF file and the YAML file next to it."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ LONGEST_NAME = 200
 
 
 def read(file: RobotFile) -> JointGraph:
-    """The joint graph of either file of the two."""
+    """Return the joint graph of either of the two files."""
     found = settings_beside(file)
     beside, settings = (file.path, settings_in(file.path)) if found is None else found
     path = urdf_beside(file.path, frames_of(settings or {})) if found is None else file.path
     if settings is None:
-        raise xml.refusal(beside, "none of the keys of this dialect", ", ".join(KEYS))
+        raise xml.refusal(beside, "none of the keys of the Gepetto format", ", ".join(KEYS))
     if not file.as_spelt:
         _require_spelling(beside, settings)
     notes: list[Note] = []
@@ -48,7 +48,9 @@ def read(file: RobotFile) -> JointGraph:
     graph.dialect = "Gepetto"
     graph.notes[:0] = notes
     if beside.stem != path.stem:
-        graph.note("guess", f"closures and motors are from {beside.name}, next to {path.name}: it names its frames")
+        graph.note(
+            "assumption", f"closures and motors are from {beside.name}, next to {path.name}: it names its frames"
+        )
     return _Settings(graph, beside, settings).apply()
 
 
@@ -65,13 +67,13 @@ def _require_spelling(path: Path, said: dict[str, Any]) -> None:
 
 
 class _Settings:
-    """The lists of names in the YAML file, each checked where it is used."""
+    """Lists of names of the YAML file, each checked where it is used."""
 
     def __init__(self, graph: JointGraph, path: Path, said: dict[str, Any]) -> None:
         self.graph, self.path, self.said = graph, path, said
 
     def apply(self) -> JointGraph:
-        """The graph with other joint types, closures and motors."""
+        """Return the graph with other joint types, closures and motors."""
         self._types()
         self._closures()
         self._motors()
@@ -87,7 +89,7 @@ class _Settings:
 
     def _name(self, key: str, value: object) -> str:
         if not isinstance(value, str) or len(value) > LONGEST_NAME:
-            raise xml.refusal(self.path, f"{key}: {str(value)[:60]!r} is no name", "names")
+            raise xml.refusal(self.path, f"{key}: {str(value)[:60]!r} is not a name", "names")
         return value
 
     def _types(self) -> None:
@@ -118,7 +120,9 @@ class _Settings:
                 raise xml.refusal(self.path, "closed_loop: not pairs of frames", "[[frame, frame], …]")
             links = [self._link(self._name("closed_loop", name)) for name in pair]
             if links[0] == links[1]:
-                raise xml.refusal(self.path, f"closed_loop: {pair[0]!r} and {pair[1]!r} are the same link", "two links")
+                raise xml.refusal(
+                    self.path, f"closed_loop: {pair[0]!r} and {pair[1]!r} are on the same link", "two links"
+                )
             point = words[number] == "3d"
             stems = [str(frame).removesuffix(suffix) for frame, suffix in zip(pair, (CUT, END), strict=True)]
             name = self.graph.fresh(
@@ -132,24 +136,24 @@ class _Settings:
             self.graph.close(name, kind, (FrameSpec(links[0]), FrameSpec(links[1])))
             if words[number] not in ("3d", "6d"):
                 given = "without a type" if words[number] is None else f"of type {words[number]!r}"
-                self.graph.note("guess", f"closure {name!r} {given} is read as rigid (6d; a point is 3d)")
+                self.graph.note("assumption", f"closure {name!r} {given} is read as rigid (6d; a point is 3d)")
 
     def _kinds(self, kinds: list[Any], count: int) -> list[str | None]:
-        """The closures' types in small letters, None where there is none: this dialect takes all but ``3d`` for 6d."""
+        """Return the closures' types in small letters, None if absent: this format reads all but ``3d`` as 6d."""
         if len(kinds) > count:
-            raise xml.refusal(self.path, f"type: {len(kinds)} types of {count} closures", "one each")
+            raise xml.refusal(self.path, f"type: {len(kinds)} types for {count} closures", "at most one each")
         words = [self._name("type", kind).lower() for kind in kinds]
         if wrong := [word for word in words if not any(map(str.isalpha, word))]:
-            raise xml.refusal(self.path, f"type: {wrong[0]!r} is no type", "3d, 6d")
+            raise xml.refusal(self.path, f"type: unknown type {wrong[0]!r}", "3d, 6d")
         return [*words, *[None] * (count - len(words))]
 
     def _link(self, frame: str) -> str:
-        """A frame is a link's, or that of a joint, which moves with the joint's child."""
+        """Return the link of a frame: the link of that name, or the child of the joint of that name."""
         if frame in self.graph.links:
             return frame
         if frame in self.graph.joints:
             return self.graph.joints[frame].links[1]
-        raise xml.refusal(self.path, f"closed_loop: no frame {frame!r}", "links and joints of the URDF")
+        raise xml.refusal(self.path, f"closed_loop: unknown frame {frame!r}", "links and joints of the URDF")
 
     def _motors(self) -> None:
         joints = self.graph.joints
@@ -158,18 +162,18 @@ class _Settings:
             wanted = [name for name, joint in joints.items() if "mot" in name and joint.type is not JointType.FIXED]
             if wanted:
                 self.graph.note(
-                    "guess",
+                    "assumption",
                     "the motors are " + ", ".join(wanted) + ": their names contain 'mot', the "
-                    "convention of this dialect (--motors to change them)",
+                    "convention of this format (--motors changes them)",
                 )
         for name in wanted:
             if name not in joints or joints[name].type is JointType.FIXED:
-                raise xml.refusal(self.path, f"name_mot: no joint {name!r} that moves", "joints of the URDF")
+                raise xml.refusal(self.path, f"name_mot: no movable joint {name!r}", "joints of the URDF")
             joints[name] = replace(joints[name], motor=joints[name].motor or Motor(name))
 
 
 def _type(name: str) -> tuple[JointType, tuple[Array, ...]] | None:
-    """The joint type that the dialect's name means, with its axes."""
+    """Return the joint type of a name of this format, with its axes."""
     stem, _, letters = name.upper().partition("_")
     axes = tuple(np.eye(3)["XYZ".index(letter)] for letter in letters if letter in "XYZ")
     kind = TYPES.get(stem)

@@ -1,4 +1,4 @@
-"""The YAML file beside a URDF: found, and read without trust."""
+"""YAML file next to a URDF: located, and read without trust."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ NULL = ("", "~", "null")
 
 
 def settings_in(path: Path) -> dict[str, Any] | None:
-    """What a YAML file says, None where it is no such file as this dialect has: lists of names, so that all scalars are
-    read as text, and types are not looked at. Raises ``BadRobotFile``."""
+    """Return the lists of a YAML file, None if it has none of this format's keys. All scalars are read as text, types
+    are ignored. Raises ``BadRobotFile``."""
     import yaml
 
     class Lists(yaml.BaseLoader):
-        """Refuses what is more than lists of names as soon as it is met."""
+        """Loader that refuses anything but lists of names as soon as it occurs."""
 
         count = depth = 0
 
@@ -38,7 +38,7 @@ def settings_in(path: Path) -> dict[str, Any] | None:
                 or self.depth > 6
                 or (self.count > 20_000)
             ):
-                raise xml.refusal(path, "YAML with aliases or tags, too deep or too long", "lists of names")
+                raise xml.refusal(path, "YAML with aliases, tags, deep nesting or too many entries", "lists of names")
             return event
 
     data = xml.content(path)
@@ -47,16 +47,16 @@ def settings_in(path: Path) -> dict[str, Any] | None:
             raise xml.refusal(path, "YAML file too large", f"up to {LARGEST_YAML} bytes")
         found = Lists(data.decode("utf-8")).get_single_data()
     except (yaml.YAMLError, RecursionError, ValueError, ArithmeticError, LookupError) as error:
-        raise xml.refusal(path, f"not YAML: {' '.join(str(error).split())[:120]}", "a whole file of YAML") from None
+        raise xml.refusal(path, f"not YAML: {' '.join(str(error).split())[:120]}", "a complete YAML file") from None
     if not isinstance(found, dict) or not set(KEYS) & set(found):
         return None
     return {key: None if isinstance(value, str) and value in NULL else value for key, value in found.items()}
 
 
 def settings_beside(file: RobotFile) -> tuple[Path, dict[str, Any]] | None:
-    """The YAML file beside a URDF that has no loops of its own and what it says, where there is one of this dialect: of
-    the same name, else the only one of another name that closes loops at links and joints which the URDF has. Raises
-    ``BadRobotFile`` where several do."""
+    """Return the YAML file of this format next to a URDF without loops, and its content: the one of the same name, else
+    the only one of another name with closures between the URDF's links and joints. Raises ``BadRobotFile`` if there are
+    several."""
     if file.root is None or file.tag != "robot" or file.has("loop"):
         return None
     own = file.path.with_suffix(".yaml").name
@@ -77,15 +77,15 @@ def settings_beside(file: RobotFile) -> tuple[Path, dict[str, Any]] | None:
     if len(named) > 1:
         raise xml.refusal(
             file.path,
-            f"{len(named)} YAML files next to it close its loops",
-            "one of them named instead",
+            "several YAML files next to it close its loops",
+            "one of them as the robot file",
             value=", ".join(path.name for path, _ in named),
         )
     return named[0] if named else None
 
 
 def in_folder(path: Path, *endings: str) -> list[Path]:
-    """The files beside a file that end so, in order; none where they are too many or too large to be meant for it."""
+    """Return the files with these extensions next to a file, in order; none if they are too many or too large."""
     try:
         found = sorted(each for each in path.parent.iterdir() if each.suffix.lower() in endings and each != path)
         small = len(found) <= MOST_BESIDE and sum(each.stat().st_size for each in found) <= LARGEST_BESIDE
@@ -95,7 +95,8 @@ def in_folder(path: Path, *endings: str) -> list[Path]:
 
 
 def urdf_beside(settings: Path, frames: set[str], names_in: Callable[[Path], set[str]] | None = None) -> Path:
-    """The URDF of the same name, ``robot.urdf``, or the only one that has the frames; raises ``BadRobotFile``."""
+    """Return the URDF of the same name, ``robot.urdf``, or the only one that has the frames. Raises
+    ``BadRobotFile``."""
     for name in (settings.with_suffix(".urdf").name, "robot.urdf"):
         if settings.with_name(name).is_file():
             return settings.with_name(name)
@@ -104,14 +105,14 @@ def urdf_beside(settings: Path, frames: set[str], names_in: Callable[[Path], set
         return others[0]
     raise xml.refusal(
         settings,
-        f"{len(others) or 'no'} URDF file next to the YAML file"
-        + (" that has the frames of its closures" if others or frames else ""),
+        f"{len(others) or 'no'} URDF files next to the YAML file"
+        + (" that have the frames of its closures" if others or frames else ""),
         settings.with_suffix(".urdf").name,
     )
 
 
 def _names_in(path: Path) -> set[str]:
-    """The names of a URDF's links and joints; none where it is no such file."""
+    """Return the names of a URDF's links and joints; none if it is not a URDF."""
     try:
         root = xml.document(xml.content(path), str(path), [])
     except BadRobotFile:
@@ -120,7 +121,8 @@ def _names_in(path: Path) -> set[str]:
 
 
 def partner(path: Path) -> Path | None:
-    """The file on the disk that is read together with this one: the YAML file of a URDF, the URDF of a YAML file."""
+    """Return the file on the disk that is read together with this one: the YAML file of a URDF, the URDF of a YAML
+    file."""
     return _partner(path, cache(_names_in))
 
 
@@ -139,7 +141,7 @@ def _partner(path: Path, names_in: Callable[[Path], set[str]]) -> Path | None:
 
 
 def frames_of(said: dict[str, Any]) -> set[str]:
-    """The names of the frames that closures are said to join."""
+    """Return the names of the frames that closures connect."""
     pairs = said.get("closed_loop")
     flat = [
         each
@@ -150,7 +152,7 @@ def frames_of(said: dict[str, Any]) -> set[str]:
 
 
 def _closing(path: Path) -> dict[str, Any] | None:
-    """What a YAML file says that may be meant for something else: None unless it closes loops."""
+    """Return the content of a YAML file that closes loops; None for other YAML files."""
     try:
         data = xml.content(path)
         found = settings_in(path) if b"closed_loop" in data else None

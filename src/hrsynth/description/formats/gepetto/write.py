@@ -15,8 +15,8 @@ from ..native.write import joint_names, text
 
 
 def write(mechanism: Mechanism) -> Written:
-    """The URDF text, the YAML text and warnings; a spherical loop is a ``3d`` closure, any other one is cut through its
-    joint and closed in ``6d``."""
+    """Return the URDF text, the YAML text and warnings; a spherical loop is a ``3d`` closure, any other one is cut at
+    the joint and closed in ``6d``."""
     robot, lost = reduce(mechanism, tuple(JointType), (JointType.SPHERICAL, JointType.FIXED))
     links = dict(robot.links)
     joints = {name: joint for name, joint in robot.joints.items() if joint.in_tree}
@@ -41,7 +41,7 @@ def write(mechanism: Mechanism) -> Written:
 
 
 def _yaml(names: list[Any]) -> str:
-    """A list in one line, every name in quotation marks."""
+    """Return a list as one line, every name in quotation marks."""
     import yaml
 
     return str(yaml.safe_dump(names, default_flow_style=True, default_style='"', width=math.inf))

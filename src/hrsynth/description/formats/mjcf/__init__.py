@@ -1,4 +1,4 @@
-"""MJCF, the dialect of MuJoCo: bodies and joints as a tree, equalities that close its loops."""
+"""MJCF, the format of MuJoCo: bodies and joints as a tree, equalities that close its loops."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ _NAMES = {"box": "box", "sphere": "sphere", "cylinder": "cylinder", "capsule": "
 
 @dataclass
 class BodyContents:
-    """What a document says of its bodies' masses and shapes; what is not right in it is left out."""
+    """Masses and shapes of a document's bodies; invalid ones are left out."""
 
     reader: XmlReader
     compiler: Compiler
@@ -47,7 +47,7 @@ class BodyContents:
                 )
 
     def of(self, body: xml.Element, childclass: str | None) -> tuple[str, ...]:
-        """The content of a body, as URDF has it: a shape that both is seen and collides is two."""
+        """Return the content of a body in URDF elements: a shape that is both visual and collision becomes two."""
         inertial, solids, before = None, list[Solid](), len(self.reader.defects)
         for element in xml.children(body):
             if element.tag == "inertial" and inertial is None:
@@ -118,7 +118,7 @@ def _sizes(text: str) -> tuple[float, ...]:
 
 
 def _numbers(text: str | None, default: tuple[float, ...]) -> tuple[float, ...] | None:
-    """The numbers of a text, the default where there is none, None where it is not right."""
+    """Return the numbers of a text, the default if there is none, None if they are invalid."""
     if text is None:
         return default
     try:
@@ -128,7 +128,7 @@ def _numbers(text: str | None, default: tuple[float, ...]) -> tuple[float, ...] 
 
 
 def elements(robot: Mechanism) -> tuple[dict[str, list[xml.Element]], list[xml.Element], list[Note]]:
-    """The elements of each body, the meshes as assets, and notes of what MuJoCo does not take."""
+    """Return the elements of each body, the meshes as assets, and notes of content that MuJoCo does not accept."""
     assets: dict[tuple[str, tuple[float, ...]], str] = {}
     found: dict[str, list[xml.Element]] = {}
     names: set[str] = set()
@@ -159,7 +159,8 @@ def elements(robot: Mechanism) -> tuple[dict[str, list[xml.Element]], list[xml.E
 
 
 def _inertial_element(inertial: Inertial) -> xml.Element | None:
-    """MuJoCo takes positive masses, and moments that each are no more than the two others together."""
+    """Return the inertial element, None unless the mass is positive and each moment is at most the sum of the two
+    others."""
     if not inertial.mass > 0:
         return None
     element = xml.new("inertial", pos=numerals.exact_vector(inertial.X[:3, 3]), mass=numerals.exact(inertial.mass))

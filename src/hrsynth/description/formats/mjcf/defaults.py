@@ -1,4 +1,4 @@
-"""What a model says once for many elements: includes, default classes, the conventions of ``<compiler>``."""
+"""Shared attributes of a model: includes, default classes, the conventions of ``<compiler>``."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Layer: TypeAlias = dict[str, dict[str, str]]
 
 
 class Defaults:
-    """The attributes that each class gives to each kind of element; classes are nested and inherit."""
+    """Attributes that each class gives to each kind of element; classes are nested and inherit."""
 
     def __init__(self, reader: XmlReader) -> None:
         self.reader = reader
@@ -44,7 +44,7 @@ class Defaults:
                 self._read(child, self.classes[name], inner)
 
     def _of_class(self, name: str, tag: str) -> dict[str, str]:
-        """What a class gives to a kind of element, what it inherits first."""
+        """Return the attributes that a class gives to a kind of element, inherited ones first."""
         if (name, tag) not in self._given:
             found = self._given[name, tag] = {}
             for layer in self.classes[name]:
@@ -52,7 +52,7 @@ class Defaults:
         return self._given[name, tag]
 
     def of(self, element: xml.Element, childclass: str | None, tag: str | None = None) -> dict[str, str]:
-        """The attributes of an element with those of its class, its own first."""
+        """Return the attributes of an element with those of its class, its own first."""
         name = element.get("class") or childclass or "main"
         if name not in self.classes:
             self.reader.defect(xml.line(element), "unknown default class", name, comma_list(self.classes, like=name))
@@ -66,7 +66,7 @@ def _attributes(element: xml.Element) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Compiler:
-    """What ``<compiler>`` says of angles, and the poses that elements then have."""
+    """Angle conventions of ``<compiler>``, and the poses of elements by them."""
 
     reader: XmlReader
     degrees: bool = True
@@ -74,7 +74,7 @@ class Compiler:
 
     @classmethod
     def of(cls, reader: XmlReader) -> Compiler:
-        """The settings of a document; the last one of each counts."""
+        """Return the conventions of a document; the last one of each counts."""
         found = cls(reader)
         for element in reader.root.findall("compiler"):
             unit, sequence = element.get("angle"), element.get("eulerseq", found.sequence)
@@ -89,11 +89,11 @@ class Compiler:
         return found
 
     def angle(self, value: float) -> float:
-        """An angle in radians."""
+        """Return an angle in radians."""
         return float(np.radians(value)) if self.degrees else float(value)
 
     def pose(self, element: xml.Element) -> Array:
-        """The pose (4, 4) of an element with ``pos`` and one of the ways to give an orientation."""
+        """Return the pose (4, 4) of an element with ``pos`` and any form of orientation."""
         return pose(self.reader.numbers(element, "pos", (0, 0, 0)), self._orientation(element))
 
     def _orientation(self, element: xml.Element) -> Array | None:
@@ -118,7 +118,7 @@ class Compiler:
         return self.reader.unit(values, xml.line(element), "a direction of length zero")
 
     def _euler(self, angles: list[float]) -> Array:
-        """Lower case turns about the axes as they have become, upper case about the fixed ones."""
+        """Return a rotation: lower case about the rotated axes, upper case about the fixed ones."""
         R = np.eye(3)
         for letter, angle in zip(self.sequence, angles, strict=True):
             turn = rotation_about(np.eye(3)["xyz".index(letter.lower())], angle)
@@ -127,7 +127,7 @@ class Compiler:
 
 
 def _least_turn(z: Array) -> Array:
-    """The smallest rotation that takes the z axis to ``z``."""
+    """Return the smallest rotation that takes the z axis to ``z``."""
     axis = np.cross([0.0, 0.0, 1.0], z)
     sine = float(np.linalg.norm(axis))
     if sine < 1e-12:
@@ -136,8 +136,8 @@ def _least_turn(z: Array) -> Array:
 
 
 def with_includes(root: xml.Element, file: str) -> xml.Element:
-    """The document with every ``<include>`` replaced by what the file holds; only files in the folder of the main one
-    and below it are read, none twice. Raises ``BadRobotFile``."""
+    """Return the document with every ``<include>`` replaced by the content of its file; only files in the folder of the
+    main one and below it are read, none twice. Raises ``BadRobotFile``."""
     folder = Path(file).resolve().parent
     read = {Path(file).resolve()}
     size = 0
@@ -150,22 +150,22 @@ def with_includes(root: xml.Element, file: str) -> xml.Element:
         try:
             path = (folder / name).resolve()
         except (OSError, ValueError):
-            raise refuse("an include that is not a file", "a file in the model's folder") from None
+            raise refuse("<include>: not a file", "a file in the model's folder") from None
         if not name or not path.is_relative_to(folder):
-            raise refuse("an include outside of the model's folder", "a file in the model's folder")
+            raise refuse("<include>: outside of the model's folder", "a file in the model's folder")
         if path in read or len(read) > MOST_INCLUDES:
-            raise refuse("a file that is included again, or too many of them", f"each once, up to {MOST_INCLUDES}")
+            raise refuse("<include>: repeated file, or too many files", f"each once, up to {MOST_INCLUDES}")
         read.add(path)
         try:
             content = xml.content(path)
         except BadRobotFile as error:
-            raise refuse(f"an include of what is {error.defects[0].problem}", "a file in the model's folder") from None
+            raise refuse(f"<include>: {error.defects[0].problem}", "a file in the model's folder") from None
         size += len(content)
         if size > LARGEST_FILE:
-            raise refuse("included files too large", f"up to {LARGEST_FILE} bytes together")
+            raise refuse("<include>: files too large", f"up to {LARGEST_FILE} bytes together")
         parent, included = element.getparent(), xml.document(content, str(path))
         if parent is None:
-            raise refuse("an include in place of the model", "<mujoco>")
+            raise refuse("<include> in place of the model", "<mujoco>")
         place = parent.index(element)
         parent.remove(element)
         for child in reversed(xml.children(included)):

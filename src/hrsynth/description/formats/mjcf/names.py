@@ -1,4 +1,4 @@
-"""Names of MJCF, of which those that are read have rows."""
+"""Names of MJCF; elements that are read have rows."""
 
 from __future__ import annotations
 

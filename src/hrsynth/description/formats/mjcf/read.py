@@ -29,7 +29,7 @@ _TYPES = {
 
 
 def read(file: RobotFile) -> JointGraph:
-    """The joint graph of an MJCF document; raises ``BadRobotFile`` with all its defects."""
+    """Return the joint graph of an MJCF document. Raises ``BadRobotFile`` with all its defects."""
     name = str(file.path)
     root = with_includes(file.document, name)
     defects, notes = NAMES.check(root, file)
@@ -40,16 +40,16 @@ def read(file: RobotFile) -> JointGraph:
 
 @dataclass
 class _MjcfReader(XmlReader):
-    """Bodies, sites and joints met on the way through the document."""
+    """Reader of bodies, sites and joints in the order of the document."""
 
     placed: dict[str, Array] = field(default_factory=dict)
     """X_WB of each body at the model's zero pose."""
     sites: dict[str, tuple[str, Array]] = field(default_factory=dict)
     zeros: dict[str, float] = field(default_factory=dict)
-    """The coordinate that MuJoCo gives each joint at that pose (``ref``)."""
+    """Coordinate that MuJoCo gives each joint at that pose (``ref``)."""
 
     def graph(self) -> JointGraph:
-        """The joint graph of the document."""
+        """Return the joint graph of the document."""
         root = self.root
         self.compiler = Compiler.of(self)
         self.defaults = Defaults(self)
@@ -85,7 +85,7 @@ class _MjcfReader(XmlReader):
         return drop_world(graph)
 
     def _children(self, element: xml.Element, link: str, childclass: str | None, X: Array) -> None:
-        """The sites, frames and bodies in a body or frame; ``X`` is the frame's pose in the body ``link``."""
+        """Read the sites, frames and bodies in a body or frame; ``X`` is the frame's pose in the body ``link``."""
         for child in xml.children(element):
             if child.tag == "site" and child.get("name"):
                 self.sites[child.get("name", "")] = (link, X @ self.compiler.pose(child))
@@ -117,7 +117,7 @@ class _MjcfReader(XmlReader):
     def _joint(
         self, element: xml.Element, before: str, X: Array, body: str, childclass: str | None, *, last: bool
     ) -> tuple[str, Array]:
-        """One joint of a body: from the link before it to the body, or to a link in between."""
+        """Add one joint of a body: from the link before it to the body, or to a link in between."""
         graph = self.result
         given = self.defaults.of(element, childclass)
         name = element.get("name") or self._fresh(f"{body}_joint")
@@ -147,7 +147,7 @@ class _MjcfReader(XmlReader):
         return after, ORIGIN
 
     def _fresh(self, name: str) -> str:
-        """A name for what has none, that nothing in the document has."""
+        """Return a name that nothing in the document has."""
         return fresh_name(name, self.result.links, self.result.joints, self.named)
 
     def _numbers(self, element: xml.Element, given: dict[str, str], key: str, default: tuple[float, ...]) -> Array:
@@ -172,21 +172,21 @@ class _MjcfReader(XmlReader):
         said = element.get("name")  # which bodies and equalities may share
         name = fresh_name(said, graph.joints) if said else graph.fresh(str(element.tag))
         if given.get("active", "true") == "false":
-            graph.note("ignored", f"the equality {name!r}, which is not active{self._wish(element, given)}")
+            graph.note("ignored", f"the inactive equality {name!r}{self._wish(element, given)}")
         elif element.tag in ("connect", "weld"):
             ends = self._ends(element, given)
             if ends is not None and ends[0].link != ends[1].link:
                 kind = JointType.SPHERICAL if element.tag == "connect" else JointType.FIXED
                 graph.close(name, kind, ends, line=xml.line(element))
             elif ends is not None:
-                self.defect(xml.line(element), f"{element.tag} {name!r} ties a body to itself", ends[0].link)
+                self.defect(xml.line(element), f"{element.tag} {name!r} connects a body to itself", ends[0].link)
         elif element.tag == "joint":
             self._gear(element, given, name)
         else:
             graph.note("ignored", f"the equality {name!r} of type {element.tag}")
 
     def _wish(self, element: xml.Element, given: dict[str, str]) -> str:
-        """What would close a point that is not active; nothing for what is no point between two bodies."""
+        """Return the ``--close`` of an inactive point between two bodies; nothing for other equalities."""
         sound = len(self.defects)
         ends = self._ends(element, given) if element.tag == "connect" else None
         del self.defects[sound:]
@@ -195,7 +195,7 @@ class _MjcfReader(XmlReader):
         return (
             " (--close "
             + ":".join(f"{end.link}@{numerals.exact_vector(end.X[:3, 3]).replace(' ', ',')}" for end in ends)
-            + " to close it)"
+            + " closes it)"
         )
 
     def _ends(self, element: xml.Element, given: dict[str, str]) -> tuple[FrameSpec, FrameSpec] | None:
@@ -230,7 +230,7 @@ class _MjcfReader(XmlReader):
         return FrameSpec(str(names[0]), frozen(X), line), FrameSpec(str(names[1]), frozen(Y), line)
 
     def _gear(self, element: xml.Element, given: dict[str, str], name: str) -> None:
-        """y − y₀ = a₀ + a₁ (x − x₀): a gear; without a second joint the first is held."""
+        """y − y₀ = a₀ + a₁ (x − x₀): add a coupling; without a second joint the first is fixed."""
         graph, line = self.result, xml.line(element)
         driven, driver = given.get("joint1"), given.get("joint2")
         words = given.get("polycoef", "0 1 0 0 0").split()
@@ -243,16 +243,16 @@ class _MjcfReader(XmlReader):
         if driven not in graph.joints or (driver is not None and driver not in graph.joints):
             return
         if driver is None:
-            graph.note("merged", f"joint {driven!r} is held by an equality")
+            graph.note("merged", f"joint {driven!r} is fixed by an equality")
             graph.joints[driven] = replace(graph.joints[driven], type=JointType.FIXED, axes=(), limits=None)
         elif np.any(coefficients[2:]):
-            self.defect(line, f"joint equality {name!r}: a curve", given.get("polycoef"), "a straight line")
+            self.defect(line, f"joint equality {name!r}: not linear", given.get("polycoef"), "a straight line")
         else:
             offset, ratio = (float(value) for value in coefficients[:2])
             graph.gears.append(CouplingSpec(name, driver, driven, ratio, offset, line))
 
     def _keyframes(self) -> None:
-        """The postures of ``<keyframe>``, by name or number; those with other than the model's coordinates are told."""
+        """Read the keyframes by name or number; those whose size differs from the model's coordinates are noted."""
         graph = self.result
         joints = [joint for name, joint in graph.joints.items() if name in self.zeros]
         for number, key in enumerate(self.root.iterfind("keyframe/key")):

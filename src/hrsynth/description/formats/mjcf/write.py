@@ -27,10 +27,10 @@ WORLD = "world"
 
 
 def write(mechanism: Mechanism) -> Written:
-    """The MJCF text of a mechanism, and warnings of what is lost.
+    """Return the MJCF text of a mechanism, and warnings of losses.
 
-    A revolute loop is two points on its axis; other loops are cut through the joint. Raises ``BadRequest`` for what
-    cannot be said.
+    A revolute loop is two points on its axis; other loops are cut at the joint. Raises ``BadRequest`` for a mechanism
+    that MJCF cannot express.
     """
     floats = all(
         joint.predecessor == mechanism.base for joint in mechanism.joints.values() if joint.type is JointType.FREE
@@ -65,7 +65,8 @@ def write(mechanism: Mechanism) -> Written:
 
 
 def _notes_on_losses(robot: Mechanism) -> list[Note]:
-    """What MJCF has no words for: one-sided limits, limits of loops, of velocity and effort; names of fixed joints."""
+    """Return notes of what MJCF cannot express: one-sided limits, limits of loops, of velocity and force, names of
+    fixed joints."""
     found = []
     bounded = [(joint, joint.limits) for joint in robot.joints.values() if joint.limits is not None]
     lost = {
@@ -75,7 +76,7 @@ def _notes_on_losses(robot: Mechanism) -> list[Note]:
         "one-sided limits": [
             joint for joint, own in bounded if joint.in_tree and (own.lower is None) != (own.upper is None)
         ],
-        "limits of velocity and effort": [
+        "limits of velocity and force or torque": [
             joint for joint, own in bounded if (own.velocity, own.effort) != (None, None)
         ],
     }
@@ -89,7 +90,7 @@ def _notes_on_losses(robot: Mechanism) -> list[Note]:
 
 
 def _bodies(robot: Mechanism, inner: Mapping[str, list[xml.Element]]) -> list[xml.Element]:
-    """The bodies that hang on the world, each holding what is its own and those that hang on it."""
+    """Return the bodies that the world carries, each holding its own elements and the bodies that it carries."""
     world = xml.new("worldbody")
     bodies = {robot.base: world}
     if robot.base != WORLD:
@@ -123,13 +124,13 @@ def _joint(robot: Mechanism, joint: Joint) -> xml.Element:
 
 
 def _at(robot: Mechanism, link: str, point: Array) -> str:
-    """A point in the frame of a link."""
+    """Return a point in the frame of a link."""
     X = inverse(robot.links[link].pose)
     return numerals.exact_vector(X[:3, :3] @ point + X[:3, 3])
 
 
 def _closure(robot: Mechanism, joint: Joint) -> list[xml.Element]:
-    """A rigid closure as a weld, a point as a point, a revolute joint as two."""
+    """Return a rigid closure as a weld, a point as a point, a revolute joint as two points."""
     one, two = joint.links
     if joint.type is JointType.FIXED:
         relative = inverse(robot.links[one].pose) @ robot.links[two].pose

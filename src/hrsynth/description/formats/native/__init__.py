@@ -1,4 +1,4 @@
-"""The native dialect: URDF for the spanning tree, ``<loop>`` and ``<hrsynth>`` elements for the rest."""
+"""The native format: URDF for the spanning tree, ``<loop>`` and ``<hrsynth>`` elements for everything else."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From a robot file in the native dialect to a mechanism, or to all the defects of the file."""
+"""Reader of the native format: from a robot file to a mechanism, or to all the defects of the file."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ from ..urdf.elements import INTERFACE, UrdfReader, is_sight, simple_transmission
 from ..urdf.names import NAMES
 
 OWN_TAGS = ("platform", "camera", "observe")
-"""What an ``<hrsynth>`` element is read for; other children are kept, unless they look like one of these."""
+"""Elements that an ``<hrsynth>`` is read for; other children are kept unless they resemble these."""
 ELSEWHERE = ("link", "joint", "loop", "coupling", "transmission")
 """Elements that belong directly into ``<robot>``."""
 
 
 def read(file: RobotFile) -> Mechanism:
-    """The mechanism that a robot file describes.
+    """Return the mechanism of a robot file.
 
     Raises
     ------
     BadRobotFile
         With every defect of the file and its line.
     LoopsNotClosed
-        Where a loop is open at the zero configuration.
+        If a loop is open at the zero configuration.
     """
     root = file.document
     defects, notes = NAMES.check(root, file)
@@ -50,7 +50,7 @@ def read(file: RobotFile) -> Mechanism:
 
 
 def parse(text: bytes | str, file: str = "<text>") -> Mechanism:
-    """The same for a text; ``file`` is what defects are reported under."""
+    """Return the mechanism of a text; ``file`` is named in its defects."""
     return _NativeReader(file, xml.document(text, file)).mechanism()
 
 
@@ -93,7 +93,7 @@ class _NativeReader(UrdfReader):
                 values[key] = float(self.numbers(limit, key, (0,))[0])
         for key in ("velocity", "effort"):
             if values.get(key, 0.0) < 0:
-                self.defect(xml.line(limit), f"{key} of <limit>", limit.get(key), "no negative number")
+                self.defect(xml.line(limit), f"{key} of <limit>", limit.get(key), "a number of at least 0")
         if kind == "continuous":
             values.pop("lower", None)
             values.pop("upper", None)
@@ -131,7 +131,7 @@ class _NativeReader(UrdfReader):
                     self.motors[each] = Motor(name, None if text in simple else text)
 
     def own(self, elements: list[xml.Element]) -> None:
-        """The ``<hrsynth>`` element: platform, camera, observations."""
+        """Read the ``<hrsynth>`` element: platform, camera, observations."""
         for extra in elements[1:]:
             self.defect(xml.line(extra), "second <hrsynth>")
         if not elements:
@@ -160,7 +160,7 @@ class _NativeReader(UrdfReader):
                         xml.line(element),
                         "no <platform>",
                         None,
-                        "a <platform>, or of a formation <observe> between its bodies",
+                        "a <platform>, or <observe> between the bodies of a formation",
                     )
         for observe in element.findall("observe"):
             self.observe(observe)
@@ -170,7 +170,7 @@ class _NativeReader(UrdfReader):
             ):
                 self.defect(
                     xml.line(child),
-                    "an element that has no meaning inside <hrsynth>",
+                    "unknown element in <hrsynth>",
                     f"<{child.tag}>",
                     ", ".join(f"<{tag}>" for tag in OWN_TAGS),
                 )
@@ -181,7 +181,7 @@ class _NativeReader(UrdfReader):
             self.rest.append(xml.canonical(bare))
 
     def observe(self, element: xml.Element) -> None:
-        """An ``<observe>``: a direction."""
+        """Read an ``<observe>`` of a direction."""
         if is_sight(element):
             return
         leg, link = self.attribute(element, "leg"), self.attribute(element, "link")
@@ -189,7 +189,7 @@ class _NativeReader(UrdfReader):
         if leg is not None and (leg == "all" or "," in leg):
             self.defect(
                 xml.line(element),
-                "observe: a leg label that does not fit into a list of legs",
+                "observe: label not usable in a list",
                 leg,
                 "a label without commas, other than all",
             )
@@ -200,7 +200,7 @@ class _NativeReader(UrdfReader):
             self.observations.append(Direction(leg, link, direction, line=xml.line(element)))
 
     def structure(self) -> str | None:
-        """The base; whatever keeps the tree joints from being one tree is a defect."""
+        """Return the base; tree joints that do not form one tree are defects."""
         root_line = xml.line(self.root)
         if not self.links:
             self.require_some(self.links, "links", self.root)
@@ -245,7 +245,7 @@ class _NativeReader(UrdfReader):
         return roots[0]
 
     def check_platform(self, base: str) -> None:
-        """The platform is another link than the base and hangs together with it; that of a formation is its first
+        """Check that the platform differs from the base and is connected to it; that of a formation is its first
         body."""
         line = next((xml.line(each) for each in self.root.iterfind("hrsynth/platform")), None)
         whole = [joint.links for joint in self.joints.values() if None not in (joint.ends[0].link, joint.ends[1].link)]
@@ -255,8 +255,8 @@ class _NativeReader(UrdfReader):
             if self.platform is None:
                 self.defect(
                     line,
-                    f"no <platform>, and no formation: {count} of the bodies that are joined to "
-                    "nothing but the base observe or are observed",
+                    f"no <platform>, and no formation: {count} of the bodies that only the base connects "
+                    "observe or are observed",
                     None,
                     "a <platform>, or two such bodies",
                 )
@@ -265,10 +265,11 @@ class _NativeReader(UrdfReader):
         if self.platform == base:
             self.defect(line, "the platform is the base", base)
         elif self.platform not in graphs.component(graphs.adjacency(self.links, whole), base):
-            self.defect(line, f"platform not reachable from the base {base!r}", self.platform)
+            self.defect(line, f"platform not connected to the base {base!r}", self.platform)
 
     def assemble(self, name: str, base: str, platform: str) -> Mechanism:
-        """The mechanism, all geometry in the base frame at the zero configuration; its loops must be closed there."""
+        """Return the mechanism, all geometry in the base frame at the zero configuration; its loops must be closed
+        there."""
         tree: list[TreeJoint] = graphs.outward(base, self.tree.values())
         poses = zero_poses(base, tree)
         joints, loops = {}, []
@@ -324,13 +325,13 @@ class _NativeReader(UrdfReader):
         return self.with_sensors(chains.merge(mechanism))
 
     def with_sensors(self, mechanism: Mechanism) -> Mechanism:
-        """With its cameras and observations of all kinds."""
+        """Return the mechanism with its cameras and observations of all kinds."""
         return as_written(mechanism, self.seen, self.cameras, self.file)
 
     def repair_rounding(
         self, mechanism: Mechanism, loops: Sequence[tuple[JointSpec, Array, Array]], poses: Mapping[str, Array]
     ) -> Mechanism | None:
-        """The mechanism as it is meant, where its numbers are rounded; None where they are not, or not to blame."""
+        """Return the mechanism with repaired geometry if its numbers are rounded; None otherwise."""
         if not (self.tolerance or self.digits.last_place):
             return None
         from ...assembly.build import joint_at, rounding

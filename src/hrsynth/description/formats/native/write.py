@@ -1,4 +1,4 @@
-"""From a mechanism to the text of a robot file in the native dialect."""
+"""Writer of the native format: from a mechanism to the text of a robot file."""
 
 from __future__ import annotations
 
@@ -28,29 +28,29 @@ NO_LIMIT = {"lower": -1000.0, "upper": 1000.0, "effort": 1000.0, "velocity": 100
 
 
 def write(mechanism: Mechanism) -> Written:
-    """The robot file of a mechanism, in which nothing is lost."""
+    """Return the robot file of a mechanism, in which nothing is lost."""
     return Written((text(mechanism),))
 
 
 def text(mechanism: Mechanism) -> str:
-    """The text of that file: reading it gives ``spanning(mechanism)`` again, writing that the same text.
+    """Return the text of that file: reading it gives ``spanning(mechanism)`` again, writing that the same text.
 
-    Raises
-    ------
-    BadRequest
-        For what the dialect cannot say: an observation seen from a link without a named camera, a universal joint whose
-        axes are not perpendicular, a link that has the name of a link in between, numbers that are not finite.
+        Raises
+        ------
+        BadRequest
+    For what the format cannot express: an observation by a link without a named camera, a universal joint whose
+            axes are not perpendicular, a link that has the name of a link in between, numbers that are not finite.
     """
     return _NativeWriter(spanning(mechanism)).text()
 
 
 def joint_names(joint: Joint) -> list[str]:
-    """The names of the joints that the file has for a tree joint: one a freedom, but one of a free joint."""
+    """Return the names of the file's joints for a tree joint: one for each coordinate, but one for a free joint."""
     return chains.part_names(joint.name, 1 if joint.type is JointType.FREE else joint.type.freedoms)
 
 
 class _NativeWriter:
-    """Writes link by link outward from the base; every pose is relative to what reading the file will give."""
+    """Writer of link after link outward from the base; every pose is relative to what reading the file will give."""
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism = mechanism
@@ -88,14 +88,14 @@ class _NativeWriter:
         return xml.text_of(root)
 
     def _origin(self, parent: xml.Element, X: Array) -> Array:
-        """Append an ``<origin>`` unless it says nothing; the pose that reading it gives."""
+        """Append an ``<origin>`` unless it is the identity; return the pose that reading it gives."""
         read, attributes = numerals.origin(X, self.decimals)
         if attributes:
             etree.SubElement(parent, "origin", attributes)
         return read
 
     def _tree_joint(self, joint: Joint) -> list[xml.Element]:
-        """The chain of links and joints that a tree joint is written as."""
+        """Return the chain of links and joints that a tree joint is written as."""
         X_P, X_child = self.poses[joint.predecessor], self.mechanism.links[joint.successor].pose
         tip = bool(np.linalg.norm(X_child[:3, 3] - joint.point) > AT_ORIGIN)
         X_PJ, attributes = numerals.origin(inverse(X_P) @ pose(joint.point, X_child[:3, :3]), self.decimals)
@@ -185,7 +185,7 @@ class _NativeWriter:
 
 
 def _local_axes(joint: Joint, X_J: Array) -> list[Array]:
-    """The joint's axes in its frame, exactly as they will be read."""
+    """Return the joint's axes in its frame, exactly as they will be read."""
     if joint.type is JointType.UNIVERSAL:
         cosine = float(joint.axes[0] @ joint.axes[1])
         if not abs(cosine) <= SAME_DIRECTION:
@@ -206,7 +206,8 @@ def _tree_type(kind: JointType, limits: Limits | None) -> str:
 
 
 def _limit(element: xml.Element, kind: JointType, limits: Limits | None) -> None:
-    """Append a ``<limit>`` with all that URDF demands; ``free`` names the values that stand for no limit."""
+    """Append a ``<limit>`` with all attributes that URDF requires; ``free`` names the values that stand for no
+    limit."""
     known = {} if limits is None else _known_limits(limits)
     if kind is JointType.PRISMATIC or (kind is JointType.REVOLUTE and {"lower", "upper"} & set(known)):
         needed = list(NO_LIMIT)
@@ -227,7 +228,7 @@ def _known_limits(limits: Limits) -> dict[str, float]:
 
 
 def _motors(motor: Motor | None, names: Sequence[str], all_names: set[str]) -> list[xml.Element]:
-    """The transmissions of one motor: those of the file it came from where they still fit, else simple ones."""
+    """Yield the transmissions of one motor: those of the file it came from if they still fit, else simple ones."""
     if motor is None:
         return []
     titles = chains.part_names(motor.name, len(names))

@@ -1,4 +1,4 @@
-"""SDFormat, the dialect of Gazebo: the joint graph itself."""
+"""SDFormat, the format of Gazebo: the joint graph itself."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ _NUMBERED = re.compile(r"(visual|collision)_\d+")
 
 
 def read_content(reader: XmlReader, link: xml.Element) -> tuple[str, ...]:
-    """What a link holds beside its kinematics; what is not right in it is left out."""
+    """Return the masses and shapes of a link; invalid ones are left out."""
     inertial, solids, before = None, [], len(reader.defects)
     for element in xml.children(link):
         try:
@@ -86,12 +86,12 @@ def _solid(reader: XmlReader, element: xml.Element) -> Solid:
         _values(shape, "size", None, 3) if kind == "box" else tuple(_values(shape, key, None)[0] for key in SIZES[kind])
     )
     if not all(size > 0 for size in sizes):
-        raise ValueError("sizes above zero")
+        raise ValueError("sizes above 0")
     return Solid(kind, sizes, X, role, name, colour)
 
 
 def write_pose(parent: xml.Element, X: Array) -> None:
-    """Append a ``<pose>`` unless it says nothing."""
+    """Append a ``<pose>`` unless it is the identity."""
     position = numerals.exact_vector(X[:3, 3])
     if not np.array_equal(X[:3, :3], np.eye(3)):
         turn = numerals.exact_vector(quaternions(X[:3, :3])[[1, 2, 3, 0]])
@@ -101,7 +101,7 @@ def write_pose(parent: xml.Element, X: Array) -> None:
 
 
 def write_content(element: xml.Element, content: Content) -> None:
-    """The mass and the shapes of a link."""
+    """Write the mass and the shapes of a link."""
     inertial = content.inertial
     if inertial is not None:
         part = etree.SubElement(element, "inertial")

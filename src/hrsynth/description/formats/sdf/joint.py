@@ -1,4 +1,4 @@
-"""A joint of SDFormat: where its frame is, in which frame its axes are given in which version, what its type means."""
+"""Joints of SDFormat: frame, frame of the axes in each version, and type."""
 
 from __future__ import annotations
 
@@ -32,19 +32,19 @@ _AXES = {"R": ("axis",), "P": ("axis",), "H": ("axis",), "C": ("axis",), "U": ("
 
 
 def text(element: xml.Element | None, tag: str) -> str | None:
-    """The text of a child element, None where it is empty or not there."""
+    """Return the text of a child element, None if it is empty or absent."""
     return None if element is None else (element.findtext(tag) or "").strip() or None
 
 
 def numbers(reader: XmlReader, element: xml.Element | None, default: tuple[float, ...]) -> Array:
-    """The numbers that an element holds, as many as the default has, which stands where it holds none."""
+    """Return the numbers of an element, as many as the default has; the default if it holds none."""
     if element is None:
         return np.array(default, dtype=float)
     return reader.values((element.text or "").strip() or None, default, xml.line(element), f"<{element.tag}>")
 
 
 def pose_of(reader: XmlReader, element: xml.Element | None) -> Array:
-    """The pose (4, 4) that a ``<pose>`` gives: x y z roll pitch yaw, degrees or a quaternion where it says so."""
+    """Return the pose (4, 4) of a ``<pose>``: x y z roll pitch yaw, with its options for degrees or a quaternion."""
     if element is None:
         return ORIGIN
     if element.get("rotation_format") == "quat_xyzw":
@@ -58,8 +58,8 @@ def pose_of(reader: XmlReader, element: xml.Element | None) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class JointFrames:
-    """The joint's frame in the parent link, in the child link and in the model; the model's axes in the frame in which
-    axes "of the model" are given (3, 3); the pose of a named frame in the model, None for an unknown one."""
+    """Frames of a joint in the parent link, in the child link and in the model; the model's axes in the frame of axes
+    "of the model" (3, 3); a function that returns the pose of a named frame in the model, None for an unknown one."""
 
     X_parent: Array
     X_child: Array
@@ -79,7 +79,7 @@ def add(
     in_tree: bool,
     prefix: str = "",
 ) -> None:
-    """Add what a ``<joint>`` means to the graph: one joint, or a chain of them, or a gear."""
+    """Add the joint of a ``<joint>`` to the graph: one joint, a chain of joints, or a coupling."""
     line, bare, kind = xml.line(element), reader.attribute(element, "name"), TYPES.get(element.get("type", ""))
     if kind is None:
         reader.defect(line, "unknown joint type", element.get("type"), ", ".join(TYPES))
@@ -111,7 +111,7 @@ def add(
 
 
 def mimics(reader: XmlReader, joints: Iterable[tuple[str, xml.Element]]) -> list[CouplingSpec]:
-    """What ``<mimic>`` says: q = multiplier × (q of the other joint − reference) + offset."""
+    """Yield the couplings of ``<mimic>``: q = multiplier × (q of the other joint − reference) + offset."""
     found = []
     for prefix, element in joints:
         for mimic in element.findall("axis/mimic"):
@@ -143,10 +143,11 @@ def _axis(
     version: tuple[int, int],
     name: str,
 ) -> Array:
-    """An axis in the joint's frame: up to 1.4 it is given in the model's, later in the joint's unless the file says."""
+    """Return an axis in the joint's frame: up to 1.4 it is given in the model's, later in the joint's unless the file
+    names another."""
     element, xyz = joint.find(tag), joint.find(f"{tag}/xyz")
     if element is None:
-        graph.assumed.setdefault(f"<{tag}> 0 0 1, the format's default, for joints that have none", []).append(name)
+        graph.assumed.setdefault(f"<{tag}> 0 0 1, the format's default, for joints without one", []).append(name)
     vector = reader.unit(numbers(reader, xyz, (0, 0, 1)), xml.line(joint), f"<{tag}> of joint {name!r}", "0 0 0")
     frame = None if xyz is None else xyz.get("expressed_in")
     of_model = text(element, "use_parent_model_frame") in ("1", "true")
@@ -162,7 +163,8 @@ def _axis(
 
 
 def _lead(reader: XmlReader, element: xml.Element, name: str) -> float:
-    """Metres a radian: from metres a turn (right-handed), or from the older radians a metre (left-handed)."""
+    """Return metres per radian: from metres per rotation (right-handed), or from the older radians per metre
+    (left-handed)."""
     pitch = element.find("screw_thread_pitch")
     if pitch is not None:
         return float(numbers(reader, pitch, (1.0,))[0]) / (2 * np.pi)
@@ -174,14 +176,14 @@ def _lead(reader: XmlReader, element: xml.Element, name: str) -> float:
 
 
 def _add_gear(reader: XmlReader, graph: JointGraph, element: xml.Element, links: tuple[str, str], name: str) -> None:
-    """A gearbox couples the two revolute joints on its reference body: θ₂ = −ratio θ₁."""
+    """Add the coupling of a gearbox, between the two revolute joints on its reference body: θ₂ = −ratio θ₁."""
     body = text(element, "gearbox_reference_body")
     ratio = -float(numbers(reader, element.find("gearbox_ratio"), (1.0,))[0])
     graph.gears.append(CouplingSpec(name, f"{body}\n{links[0]}", f"{body}\n{links[1]}", ratio, line=xml.line(element)))
 
 
 def name_gears(reader: XmlReader, graph: JointGraph) -> None:
-    """Put the joints' names where gearboxes name the links that they join."""
+    """Replace the links that gearboxes name by the joints of these links."""
     found = []
     for gear in graph.gears:
         names = []
@@ -206,7 +208,7 @@ def name_gears(reader: XmlReader, graph: JointGraph) -> None:
 
 
 def guess_motors(graph: JointGraph) -> None:
-    """Where some joints have the effort limit zero and others do not, the others are the motors."""
+    """Assume that the joints with a nonzero effort limit are the motors, if only some limits are zero."""
     efforts = {
         name: joint.limits.effort
         for name, joint in graph.joints.items()
@@ -217,7 +219,7 @@ def guess_motors(graph: JointGraph) -> None:
         for name in driven:
             graph.joints[name] = replace(graph.joints[name], motor=Motor(f"motor_{name}"))
         graph.note(
-            "guess",
-            "the motors are " + ", ".join(driven) + ": the joints whose effort limit is not zero "
-            "(--motors to change them)",
+            "assumption",
+            "the motors are " + ", ".join(driven) + ": the joints whose ``effort`` limit is not zero "
+            "(--motors changes them)",
         )

@@ -1,4 +1,4 @@
-"""Names of SDFormat, of which those that are read have rows."""
+"""Names of SDFormat; elements that are read have rows."""
 
 from __future__ import annotations
 

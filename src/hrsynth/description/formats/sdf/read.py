@@ -28,7 +28,7 @@ VERSIONS = "1.4 to 1.12"
 
 
 def read(file: RobotFile) -> JointGraph:
-    """The joint graph of an SDFormat document; raises ``BadRobotFile`` with all its defects."""
+    """Return the joint graph of an SDFormat document. Raises ``BadRobotFile`` with all its defects."""
     root = file.document
     defects, notes = NAMES.check(root, file)
     graph = _SdfReader(str(file.path), root, defects).graph()
@@ -38,7 +38,8 @@ def read(file: RobotFile) -> JointGraph:
 
 @dataclass(frozen=True, eq=False)
 class _FrameElement:
-    """A frame: the element that gives its pose, what the pose is relative to, the link or frame it is fixed to."""
+    """Frame: the element that gives its pose, the name that the pose is relative to, the link or frame it is fixed
+    to."""
 
     element: xml.Element | None
     relative_to: str
@@ -48,7 +49,7 @@ class _FrameElement:
 
 @dataclass
 class _SdfReader(XmlReader):
-    """Links, frames and joints of one model, nested models included (their names are ``model::name``)."""
+    """Reader of the links, frames and joints of one model, nested models included (their names are ``model::name``)."""
 
     frames: dict[str, _FrameElement] = field(default_factory=dict)
     joints: list[tuple[str, xml.Element]] = field(default_factory=list)
@@ -56,7 +57,7 @@ class _SdfReader(XmlReader):
     carried: set[str] = field(default_factory=set)
 
     def graph(self) -> JointGraph:
-        """The joint graph of the document's model."""
+        """Return the joint graph of the document's model."""
         self.version = self._version()
         model = self._model()
         graph = self.result = JointGraph(model.get("name") or "robot", self.file, "SDF", digits=self.digits)
@@ -85,7 +86,7 @@ class _SdfReader(XmlReader):
         return drop_world(graph)
 
     def _states(self, model: str | None) -> None:
-        """The joints' coordinates in the states of the document's worlds, by ``world_name``."""
+        """Read the joints' coordinates in the states of the document's worlds, by ``world_name``."""
         for state in self.root.iterfind("world/state"):
             joints = [
                 joint for each in state.findall("model") if each.get("name") == model for joint in each.findall("joint")
@@ -101,7 +102,7 @@ class _SdfReader(XmlReader):
                 self.result.postures[state.get("world_name") or state.get("name") or "state"] = found
 
     def _closures(self, model: xml.Element) -> None:
-        """What other tools add to the format to close loops."""
+        """Add the closures of other tools' extensions."""
         read_drake(self, self.result, model, self._frame_spec)
         plugins = [*model.findall("plugin"), *self.root.findall("world/plugin")]
         if plugins:
@@ -115,7 +116,7 @@ class _SdfReader(XmlReader):
             other_pairs(self.result, frames)
 
     def _frame_spec(self, name: str) -> FrameSpec | None:
-        """The link that a link or frame of that name is fixed to, and where; None for no such name."""
+        """Return the link that a link or frame of that name is fixed to, and its pose; None for an unknown name."""
         frame = self.frames.get(name)
         line = None if frame is None or frame.element is None else xml.line(frame.element)
         link = None if frame is None else self._link(name, line)
@@ -145,7 +146,7 @@ class _SdfReader(XmlReader):
         return jointed[0]
 
     def _collect(self, model: xml.Element, prefix: str, depth: int) -> None:
-        """The frames of a model and of those in it; ``prefix`` is what the names in it begin with."""
+        """Collect the frames of a model and of those in it; ``prefix`` begins the names in it."""
         if depth > MOST_NESTED_MODELS:
             self.defect(xml.line(model), "models nested too deeply", None, f"{MOST_NESTED_MODELS} levels")
             return
@@ -182,17 +183,17 @@ class _SdfReader(XmlReader):
             self.frames.setdefault(name, frame)
 
     def _host(self, prefix: str, element: xml.Element) -> str | None:
-        """The frame that the pose of an element says it is relative to."""
+        """Return the frame that the pose of an element is relative to."""
         position = element.find("pose")
         given = None if position is None else position.get("relative_to") or position.get("frame")
         return prefix + given if given and given != WORLD else given
 
     def _pose(self, name: str, line: int | None) -> Array:
-        """X_WN of a frame (4, 4), by the chain of frames that it is relative to."""
+        """Return X_WN of a frame (4, 4), by the chain of frames that it is relative to."""
         chain: list[str] = []
         while name != WORLD and name not in self.poses:
             if name in chain or name not in self.frames:
-                cycle = ("frames relative to each other in a cycle", name, "a frame that is placed without it")
+                cycle = ("frames relative to each other in a cycle", name, "a frame placed relative to the model")
                 unknown = ("unknown frame", name, comma_list(self.frames, like=name))
                 self.defect(line, *(cycle if name in chain else unknown))
                 return ORIGIN
@@ -205,7 +206,7 @@ class _SdfReader(XmlReader):
         return X
 
     def _link(self, name: str, line: int | None) -> str | None:
-        """The link that a frame is fixed to."""
+        """Return the link that a frame is fixed to."""
         links, passed = self.result.links, set()
         while name != WORLD and name not in links:
             frame = self.frames.get(name)
@@ -233,7 +234,7 @@ class _SdfReader(XmlReader):
         if parent is None or child is None:
             return
         if parent == child:
-            self.defect(line, f"joint {title!r} joins a link to itself", parent)
+            self.defect(line, f"joint {title!r} connects a link to itself", parent)
             return
         X_J = self._pose(self._host(prefix, element) or names[1], line) @ pose_of(self, element.find("pose"))
         X_PW, X_CW = inverse(self._pose(parent, line)), inverse(self._pose(child, line))
@@ -249,7 +250,7 @@ class _SdfReader(XmlReader):
             X_F = self._pose(names[0], line)
             if np.linalg.norm(X_F[:3, 3] - X_J[:3, 3]) > SAME_GEOMETRY:
                 self.result.assumed.setdefault(
-                    "joints join the frames that they name, which do not coincide at the file's pose", []
+                    "joints connect the frames that they name, which do not coincide in the file's configuration", []
                 ).append(title)
                 frames = replace(frames, X_parent=X_PW @ X_F)
         in_tree = child not in self.carried and element.get("type") != "gearbox"

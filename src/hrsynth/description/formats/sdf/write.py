@@ -31,7 +31,7 @@ _OWN = re.compile("__.*__", re.DOTALL)
 
 
 def write(mechanism: Mechanism) -> Written:
-    """The SDFormat text of a mechanism, and warnings of what is lost."""
+    """Return the SDFormat text of a mechanism, and warnings of losses."""
     robot, lost = reduce(mechanism, tuple(_NAMES), tuple(_NAMES), tuple(_NAMES), BODY)
     require_free_world(robot, WORLD, "SDFormat")
     lost = (*lost, *_names(robot))
@@ -60,7 +60,7 @@ def write(mechanism: Mechanism) -> Written:
 
 
 def _names(robot: Mechanism) -> list[Note]:
-    """Warnings of names that SDFormat's own readers refuse; raises ``BadRequest`` for those of frames of its own."""
+    """Return warnings of names that SDFormat's own readers refuse. Raises ``BadRequest`` for reserved names."""
     links, joints = robot.links.keys(), robot.joints.keys()
     own = sorted(name for name in {*links, *joints} if _OWN.fullmatch(name))
     if own:
@@ -71,7 +71,7 @@ def _names(robot: Mechanism) -> list[Note]:
         )
     odd = [f"{name!r} (::)" for name in sorted({*links, *joints}) if "::" in name]
     odd += [f"{name!r} (of a link and a joint)" for name in sorted(links & joints)]
-    return [Note("warning", "names that Gazebo refuses, rename them: " + comma_list(odd))] if odd else []
+    return [Note("warning", "names that Gazebo refuses (rename them): " + comma_list(odd))] if odd else []
 
 
 def _joint(model: xml.Element, robot: Mechanism, joint: Joint, gear: tuple[str, float] | None) -> None:

@@ -1,4 +1,4 @@
-"""URDF as the world writes it, with the closures of many tools; it is read, and written as the native dialect."""
+"""URDF with the closures of many tools; it is read, and written as the native format."""
 
 from __future__ import annotations
 

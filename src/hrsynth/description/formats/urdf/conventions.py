@@ -1,4 +1,4 @@
-"""How tools write the closures that URDF has no words for: each convention is a value that the reader is handed.
+"""Conventions of tools for closures that URDF cannot express: each is a function that the reader calls.
 
 A new convention is one more function and its line in ``CONVENTIONS``.
 """
@@ -24,8 +24,8 @@ Ends = tuple[FrameSpec, FrameSpec]
 
 @dataclass(frozen=True)
 class Convention:
-    """Who writes closures so, and what adds those of a document to its graph; ``tag``: the elements that state them,
-    None where links with certain names do (which counts only where loops are not given in other words)."""
+    """Tool that writes such closures, and the function that adds those of a document to its graph; ``tag``: their
+    elements, None for links with certain names (only used if the file closes no loops otherwise)."""
 
     tool: str
     read: Callable[[UrdfReader, JointGraph], None]
@@ -33,18 +33,18 @@ class Convention:
 
 
 def _joins(reader: UrdfReader, what: str, element: xml.Element, ends: Ends) -> bool:
-    """Whether the ends of a closure are two links that there are; what is wrong is a defect."""
+    """Return True if the ends of a closure are two existing links; anything else is a defect."""
     if not all(reader.check_link(end.link, end.line, f"{what}: unknown link") for end in ends):
         return False
     if ends[0].link == ends[1].link:
-        reader.defect(xml.line(element), f"{what} joins a link to itself", ends[0].link)
+        reader.defect(xml.line(element), f"{what} connects a link to itself", ends[0].link)
         return False
     return True
 
 
 def gazebo(reader: UrdfReader, graph: JointGraph) -> None:
-    """``<gazebo><joint>``: a joint of SDFormat (in the conventions of 1.6) closes a loop where its child is at zero; so
-    does a plugin that holds two links together."""
+    """Add the joints of ``<gazebo><joint>``: joints of SDFormat (in the conventions of 1.6) close a loop where their
+    child is at zero; plugins that connect two links do so too."""
     found = [joint for element in reader.root.findall("gazebo") for joint in element.findall("joint")]
     plugins = [plugin for element in reader.root.findall("gazebo") for plugin in element.findall("plugin")]
     if not found and not plugins:
@@ -59,7 +59,7 @@ def gazebo(reader: UrdfReader, graph: JointGraph) -> None:
         if not all(reader.check_link(link, xml.line(element), what) for link in (parent, child)):
             continue
         if parent not in poses or child not in poses:
-            reader.defect(xml.line(element), "joint of <gazebo>: a link attached to nothing", element.get("name"))
+            reader.defect(xml.line(element), "joint of <gazebo>: unconnected link", element.get("name"))
             continue
         X_MJ = poses[child] @ sdf.pose_of(reader, element.find("pose"))
         frames = sdf.JointFrames(inverse(poses[parent]) @ X_MJ, inverse(poses[child]) @ X_MJ, X_MJ, np.eye(3))
@@ -70,7 +70,7 @@ def gazebo(reader: UrdfReader, graph: JointGraph) -> None:
 
 
 def _at_zero(graph: JointGraph) -> dict[str, Array]:
-    """The poses (4, 4) of the links that hang on the first root, all joints at zero."""
+    """Return the poses (4, 4) of the links in the tree of the first root, all joints at zero."""
     carried = {joint.links[1] for joint in graph.joints.values()}
     base = next((link for link in graph.links if link not in carried), next(iter(graph.links)))
     return zero_poses(base, spanning_tree(base, (joint for joint in graph.joints.values() if joint.in_tree)))
@@ -81,8 +81,8 @@ _SIDES = ("parent", "child")
 
 
 def constraint(reader: UrdfReader, graph: JointGraph) -> None:
-    """``<constraint name type>`` as proposed for urdfdom: parent and child, each with an origin and an axis of its
-    own."""
+    """Add the closure of ``<constraint name type>`` as proposed for urdfdom: parent and child, each with its own origin
+    and axis."""
     for element in reader.root.findall("constraint"):
         name, kind = reader.attribute(element, "name"), CONSTRAINTS.get(element.get("type", ""))
         if kind is None:
@@ -97,7 +97,7 @@ def constraint(reader: UrdfReader, graph: JointGraph) -> None:
 
 
 def _constraint_end(reader: UrdfReader, element: xml.Element, side: str, kind: JointType) -> FrameSpec:
-    """The joint's frame on one link, its z axis along the axis that the element gives for it."""
+    """Return the joint's frame on one link, its z axis along the axis that the element gives for it."""
     link = element.find(side)
     name = element.get(side) if link is None else link.get("link", link.text)
     origin = element.find(f"{side}_origin")
@@ -111,15 +111,15 @@ def _constraint_end(reader: UrdfReader, element: xml.Element, side: str, kind: J
 
 
 def _constraint_axis(reader: UrdfReader, element: xml.Element, side: str) -> Array:
-    """The axis in the frame of one side: its own, else the common one, else x."""
+    """Return the axis in the frame of one side: its own, else the common one, else x."""
     own = element.find(f"{side}_axis")
     axis = element.find("axis") if own is None else own
     return np.array([1.0, 0.0, 0.0]) if axis is None else reader.direction(axis, "xyz", (1, 0, 0))
 
 
 def loop_joint(reader: UrdfReader, graph: JointGraph) -> None:
-    """``<loop_joint name type>``: of Isaac Sim with two ends that have ``xyz`` and ``rpy`` (real files write two
-    ``<link1>``), of exporters for Fusion with ``<parent>`` and ``<child>`` as a ``<constraint>`` has them."""
+    """Add the closure of ``<loop_joint name type>``: of Isaac Sim with two ends that have ``xyz`` and ``rpy`` (real
+    files write two ``<link1>``), of exporters for Fusion with ``<parent>`` and ``<child>`` like a ``<constraint>``."""
     for element in reader.root.findall("loop_joint"):
         name = reader.attribute(element, "name")
         kind = CONSTRAINTS.get(element.get("type", "spherical"))
@@ -148,8 +148,8 @@ def loop_joint(reader: UrdfReader, graph: JointGraph) -> None:
 
 
 def _fusion_ends(reader: UrdfReader, graph: JointGraph, element: xml.Element) -> Ends:
-    """The parent's joint frame, parallel to the parent's own, and the child's, parallel to it at the file's pose: the
-    axis is given in the parent, and each link has the point where the joint is."""
+    """Return the parent's joint frame, parallel to the parent's own, and the child's, parallel to it in the file's
+    configuration: the axis is given in the parent, and each link has the joint's point."""
     links = [str(each.get("link", each.text)).strip() for side in _SIDES for each in element.findall(side)[:1]]
     if len(links) < 2:
         reader.defect(xml.line(element), "loop_joint without two links", element.get("name"))
@@ -163,7 +163,7 @@ def _fusion_ends(reader: UrdfReader, graph: JointGraph, element: xml.Element) ->
 
 
 def drake(reader: UrdfReader, graph: JointGraph) -> None:
-    """Drake's ball constraints and bushings between links and ``<frame>`` elements."""
+    """Add Drake's ball constraints and bushings between links and ``<frame>`` elements."""
     frames = {name: FrameSpec(name) for name in graph.links}
     for element in reader.root.findall("frame"):
         name, link = element.get("name"), element.get("link")
@@ -173,7 +173,7 @@ def drake(reader: UrdfReader, graph: JointGraph) -> None:
 
 
 def named_frames(reader: UrdfReader, graph: JointGraph) -> None:
-    """Links on one fixed joint that carry nothing, whose names tell where a loop closes."""
+    """Close pairs of links on one fixed joint that carry nothing and whose names mark where a loop closes."""
     carried = {joint.links[1]: joint for joint in graph.joints.values()}
     carriers = {joint.links[0] for joint in graph.joints.values()}
     frames = {name: FrameSpec(name, line=link.line) for name, link in graph.links.items()}

@@ -1,4 +1,4 @@
-"""The elements of URDF and its loops: links, joints, ``<loop>``, ``<transmission>``, ``<coupling>``."""
+"""Elements of URDF and its loops: links, joints, ``<loop>``, ``<transmission>``, ``<coupling>``."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ TREE_TYPES = {
 }
 INTERFACE = "hardware_interface/VelocityJointInterface"
 _PLANAR = ("__x", "__y", "__turn")
-"""Ends of the names of the three joints that a planar one is."""
+"""Suffixes of the names of the three joints of a planar one."""
 
 
 @dataclass
 class UrdfReader(XmlReader):
-    """The joint graph of a URDF document."""
+    """Reader of the joint graph of a URDF document."""
 
     links: dict[str, Link] = field(default_factory=dict)
     tree: dict[str, JointSpec] = field(default_factory=dict)
@@ -47,7 +47,7 @@ class UrdfReader(XmlReader):
         return {**self.tree, **self.loops}
 
     def elements(self) -> None:
-        """Read links, joints and loops, then what names them."""
+        """Read links, joints and loops, then the elements that name them."""
         for element in xml.children(self.root):
             if element.tag == "link":
                 self.link(element)
@@ -65,7 +65,7 @@ class UrdfReader(XmlReader):
     def check_link(
         self, link: str | None, line: int | None, what: str, names: Mapping[str, object] | None = None
     ) -> bool:
-        """Whether a link (or another of ``names``) exists; None was reported before."""
+        """Return True if a link (or another of ``names``) exists; None was reported before."""
         table = self.links if names is None else names
         if link is None:
             return False
@@ -75,7 +75,7 @@ class UrdfReader(XmlReader):
         return link in table
 
     def link(self, element: xml.Element) -> None:
-        """A ``<link>``."""
+        """Read a ``<link>``."""
         name = self.attribute(element, "name")
         if name is None:
             return
@@ -85,25 +85,25 @@ class UrdfReader(XmlReader):
         self.links[name] = Link(name, xml=xml.unknown(element, ["name"], []), line=xml.line(element))
 
     def joint(self, element: xml.Element) -> None:
-        """A ``<joint>`` of the tree."""
+        """Read a ``<joint>`` of the tree."""
         for mimic in element.findall("mimic"):
             self.defect(
                 xml.line(mimic),
-                "a <mimic> is a gear between two joints, written differently in this dialect",
+                "<mimic>: the native format has <coupling> instead; joint",
                 element.get("name"),
                 "a <coupling> with predecessor, successor and ratio",
             )
         self.add(element, TREE_TYPES, self.tree_ends(element), ["origin", "parent", "child"])
 
     def tree_ends(self, element: xml.Element) -> tuple[FrameSpec, FrameSpec]:
-        """Parent and child of a ``<joint>``, whose frame is the child's."""
+        """Return parent and child of a ``<joint>``, whose frame is the child's."""
         return self.ends(element, ("parent", "child"), (self.origin(element), ORIGIN))
 
     def ends(
         self, element: xml.Element, tags: tuple[str, str], frames: Sequence[Array] = ()
     ) -> tuple[FrameSpec, FrameSpec]:
-        """The two ends of a joint, each in a child element that names its link; the frames in them are ``frames``, or
-        what their ``<origin>`` says."""
+        """Return the two ends of a joint, each in a child element that names its link; the frames in them are
+        ``frames``, or those of their ``<origin>``."""
         found = []
         for number, tag in enumerate(tags):
             end = self.only(element, tag)
@@ -118,7 +118,7 @@ class UrdfReader(XmlReader):
     def add(
         self, element: xml.Element, types: Mapping[str, JointType], ends: tuple[FrameSpec, FrameSpec], tags: list[str]
     ) -> None:
-        """What tree joints and loops have in common."""
+        """Read the common parts of tree joints and loops."""
         name, kind = self.attribute(element, "name"), self.attribute(element, "type")
         type_ = None if kind is None else types.get(kind)
         if kind is not None and type_ is None:
@@ -140,25 +140,25 @@ class UrdfReader(XmlReader):
             self.tree[name] = joint
 
     def limits(self, element: xml.Element, kind: str | None) -> Limits | None:
-        """The ``<limit>`` of a joint of the type ``kind``."""
+        """Return the ``<limit>`` of a joint of the type ``kind``."""
         raise NotImplementedError
 
     def transmission(self, element: xml.Element) -> None:
-        """A ``<transmission>``: its joints are motors."""
+        """Read a ``<transmission>``: its joints are motors."""
         raise NotImplementedError
 
     def planar(self, joint: JointSpec) -> None:
-        """URDF's planar joint is P, P, R through two links of its own."""
+        """Add the P, P, R and two links that URDF's planar joint is."""
         names = [joint.name + suffix for suffix in _PLANAR]
         for name in names[:2]:
             if name in self.links:
-                self.defect(joint.line, "a planar joint's own link takes the name of a link", name)
+                self.defect(joint.line, "link name already used by a planar joint", name)
             self.links.setdefault(name, Link(name, line=joint.line))
         ends = [joint.ends[0], *(FrameSpec(name, ORIGIN, joint.line) for name in names[:2]), joint.ends[1]]
         for number, (kind, axis) in enumerate(elementary(JointType.PLANAR, joint.axes)):
             name = names[number]
             if name in self.tree or name in self.loops:
-                self.defect(joint.line, "a planar joint's own joint takes the name of a joint", name)
+                self.defect(joint.line, "joint name already used by a planar joint", name)
             self.tree[name] = JointSpec(
                 name,
                 kind,
@@ -170,12 +170,12 @@ class UrdfReader(XmlReader):
             )
 
     def planar_parts(self, name: str) -> list[str]:
-        """The joints that the planar joint of that name is."""
+        """Return the joints that the planar joint of that name is."""
         parts = [name + suffix for suffix in _PLANAR]
         return parts if name not in self.joints and all(part in self.tree for part in parts) else []
 
     def coupling(self, element: xml.Element, names: set[str]) -> None:
-        """A ``<coupling>``; ``names`` are those of the ones before it."""
+        """Read a ``<coupling>``; ``names`` are those of the ones before it."""
         name = self.attribute(element, "name")
         if name in names:
             self.defect(xml.line(element), "second coupling of the same name", name)
@@ -185,7 +185,7 @@ class UrdfReader(XmlReader):
         for end, tag in zip((one, two), tags, strict=True):
             self.check_link(end.link, end.line, f"{tag} of a coupling: unknown link")
         if one.link and one.link == two.link:
-            self.defect(two.line, "successor of a coupling, coupled with itself", two.link, "another link")
+            self.defect(two.line, "successor of a coupling is its predecessor", two.link, "another link")
         ratio = self.only(element, "ratio")
         if ratio is None:
             self.defect(xml.line(element), "coupling without <ratio>", name)
@@ -194,16 +194,15 @@ class UrdfReader(XmlReader):
             if value == 0:
                 self.defect(
                     xml.line(ratio),
-                    "ratio of a coupling, which would hold its second joint",
+                    "ratio of a coupling would fix its second joint",
                     ratio.get("value"),
-                    "a number other than 0, or a fixed joint",
+                    "a number other than 0",
                 )
             if name and one.link and two.link:
                 self.couplings.append(Coupling(name, one.link, two.link, value, xml.line(element)))
 
     def sights(self, own: xml.Element) -> tuple[list[ObservationSpec], list[NamedCamera]]:
-        """The observations in ``<hrsynth>`` that are no directions seen from its own camera, and the cameras that have
-        a name."""
+        """Return the observations in ``<hrsynth>`` other than directions by its own camera, and the named cameras."""
         specs, cameras = list[ObservationSpec](), list[NamedCamera]()
         for element in own.findall("camera"):
             if element.get("name") is not None:
@@ -231,15 +230,16 @@ class UrdfReader(XmlReader):
         return specs, cameras
 
     def check_ends(self, loop: str = "loop") -> None:
-        """A defect for every end on no link and every joint from a link to itself; loops are called ``loop``."""
+        """Record a defect for every end on an unknown link and every joint from a link to itself; loops are called
+        ``loop``."""
         for name, joint in self.joints.items():
             for end in joint.ends:
                 self.check_link(end.link, end.line, f"{'joint' if joint.in_tree else loop} {name!r}: unknown link")
             if joint.ends[0].link is not None and joint.ends[0].link == joint.ends[1].link:
-                self.defect(joint.line, f"{name!r} joins a link to itself", joint.ends[0].link)
+                self.defect(joint.line, f"{name!r} connects a link to itself", joint.ends[0].link)
 
     def rings(self) -> Iterator[list[JointSpec]]:
-        """The tree joints that form a cycle, each ring once, from the base's side outward."""
+        """Yield the tree joints that form a cycle, each cycle once, from the base's side outward."""
         carrier: dict[str | None, JointSpec] = {}
         for joint in self.tree.values():
             if joint.ends[1].link not in (None, joint.ends[0].link):
@@ -257,12 +257,12 @@ class UrdfReader(XmlReader):
 
 
 def is_sight(element: xml.Element) -> bool:
-    """Whether an ``<observe>`` is no direction of a segment seen from the reference link."""
+    """Return True if an ``<observe>`` is not the direction of a segment by the reference link."""
     return element.get("kind") is not None or element.get("camera") is not None
 
 
 def simple_transmission(title: str, joint: str, interface: str | None = INTERFACE) -> xml.Element:
-    """The transmission of a motor of which nothing is known but its name; other parsers demand an interface."""
+    """Return the transmission of a motor known by its name only; other parsers require an interface."""
     element = etree.Element("transmission", name=title)
     etree.SubElement(element, "type").text = "transmission_interface/SimpleTransmission"
     target = etree.SubElement(element, "joint", name=joint)

@@ -1,5 +1,5 @@
-"""URDF as the world writes it: URDF+ (``<loop>``, ``<coupling>``), ``<mimic>``, two joints with one child, closures of
-other tools; what does not concern kinematics may be wrong."""
+"""URDF of other tools: URDF+ (``<loop>``, ``<coupling>``), ``<mimic>``, two joints with one child, closures of other
+tools; errors outside of the kinematics are tolerated."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ _KNOWN = (
 
 
 def read(file: RobotFile, *, frames: bool = True) -> JointGraph:
-    """The joint graph of a URDF document; raises ``BadRobotFile`` with all its defects.
+    """Return the joint graph of a URDF document. Raises ``BadRobotFile`` with all its defects.
 
-    ``frames`` says whether links may be closing frames by their names: not where loops are given in other words.
+    ``frames``: links may be closing frames by their names, if loops are not given otherwise.
     """
     root = file.document
     defects, notes = NAMES.check(root, file)
@@ -50,7 +50,7 @@ class _TolerantReader(UrdfReader):
     carried: set[str | None] = field(default_factory=set)
 
     def graph(self, frames: bool) -> JointGraph:
-        """All links, joints and closures."""
+        """Return all links, joints and closures."""
         self.elements()
         self.check_structure()
         graph = JointGraph(self.root.get("name") or "robot", self.file, "URDF", self.links, digits=self.digits)
@@ -100,15 +100,15 @@ class _TolerantReader(UrdfReader):
             if target in joints and joints[target].type is not JointType.FIXED:
                 self.motors.setdefault(target, Motor(name))
             elif target is not None:
-                self.notes.append(("ignored", f"transmission {name!r}: no joint {target!r} that moves"))
+                self.notes.append(("ignored", f"transmission {name!r}: no movable joint {target!r}"))
 
     def check_structure(self) -> None:
-        """Every end of every joint is a link that is there, and no joints carry each other in a ring."""
+        """Check that every end of every joint is a known link, and that no joints form a cycle."""
         if len(self.links) < len(self.root.findall("link")):
             self.require_sound()
         if WORLD not in self.links and any(end.link == WORLD for joint in self.joints.values() for end in joint.ends):
             self.links = {WORLD: Link(WORLD), **self.links}
-            self.notes.append(("guess", f"no link {WORLD!r} is declared: it is read as the ground"))
+            self.notes.append(("assumption", f"no link {WORLD!r} is declared: it is read as the ground"))
         self.check_ends("joint")
         self.require_some(self.links, "links", self.root)
         for ring in self.rings():
@@ -117,7 +117,8 @@ class _TolerantReader(UrdfReader):
         self.require_sound()
 
     def add_gears(self, graph: JointGraph) -> None:
-        """Couplings name links, which may be fixed to what their joints carry; mimics name joints."""
+        """Add couplings: ``<coupling>`` names links, which may be fixed to the links that joints carry; ``<mimic>``
+        names joints."""
         carrier = {joint.links[1]: joint for joint in graph.joints.values() if joint.in_tree}
 
         def carrying(link: str) -> str | None:
@@ -136,7 +137,7 @@ class _TolerantReader(UrdfReader):
         graph.follow(self.mimics)
 
     def own(self, graph: JointGraph) -> None:
-        """Platform, camera and observations where the file has an ``<hrsynth>`` element all the same."""
+        """Read platform, camera and observations from an ``<hrsynth>`` element, if there is one."""
         for own in self.root.findall("hrsynth")[:1]:
             for tag in ("platform", "camera"):
                 element = next((each for each in own.findall(tag) if each.get("name") is None), None)

@@ -1,4 +1,4 @@
-"""Xacro files, where the package of that name is installed: it expands them in a process that can do nothing else."""
+"""Xacro files: the package of that name, if installed, expands them in a restricted process."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ... import xml
 
 
 def is_needed(root: xml.Element) -> bool:
-    """Whether a URDF document uses elements of xacro, or declares its prefix and has expressions."""
+    """Return True if a URDF document uses elements of xacro, or declares its prefix and has expressions."""
     if root.tag != "robot":
         return False
     if any("xacro}" in element.tag for element in root.iter("*") if isinstance(element.tag, str)):
@@ -25,7 +25,7 @@ def is_needed(root: xml.Element) -> bool:
 
 
 def expand(path: Path) -> xml.Element:
-    """The document that a xacro file stands for; raises ``BadRobotFile``, ``MissingExtra``."""
+    """Return the expanded document of a xacro file. Raises ``BadRobotFile``, ``MissingExtra``."""
     import subprocess
 
     if importlib.util.find_spec("xacro") is None:
@@ -53,7 +53,7 @@ def expand(path: Path) -> xml.Element:
 
 
 def _last_message(errors: str) -> tuple[str | None, int | None, str]:
-    """File, line and text of what the process says last."""
+    """Return file, line and text of the last message of the process."""
     last = "".join([line for line in errors.splitlines() if line.strip()][-1:])
     try:
         found = json.loads(last)

@@ -1,13 +1,12 @@
-"""Run as a program: expand the xacro file that is named, to standard output: a line of JSON that tells the file and the
-line of each element, then the document; no files are written, none read elsewhere. What is wrong is one line of JSON
-on standard error.
+"""Program: expand the named xacro file to standard output: a line of JSON with the file and the line of each element,
+then the document. It writes no files and reads none elsewhere. An error is one line of JSON on standard error.
 
 Expressions are Python's in syntax only: a walker over the syntax tree computes them from an allow-list. Its values are
-numbers, texts, truth values, None, and lists and dictionaries of these; functions can be called but are no values, and
-nothing has attributes. The package's own ``eval`` is taken away.
+numbers, texts, truth values, None, and lists and dictionaries of these; functions can be called but are not values, and
+nothing has attributes. The package's own ``eval`` is removed.
 
-``$(find PACKAGE)`` stands for the folder, the file's own or one above it, that has what follows. Variables of the
-environment are empty.
+``$(find PACKAGE)`` is the folder, the file's own or one above it, that has the path behind it. Environment variables
+are empty.
 """
 
 from __future__ import annotations
@@ -27,9 +26,9 @@ LIMITS = {"AS": 900_000_000, "CPU": 4, "FSIZE": 0, "NOFILE": 64, "CORE": 0, "NPR
 """Limits of the process by the names of ``resource``: bytes, seconds, numbers. That of processes (NPROC) does not hold
 for root."""
 LEVELS = 4
-"""Folders above the file in which a package's files are looked for."""
+"""Number of folders above the file that are searched for a package's files."""
 LONGEST_POWER = 10_000
-"""Bits that a power of whole numbers may have."""
+"""Largest number of bits of a power of integers."""
 MARK = "/find:package"
 
 VALUES = (bool, int, float, str, list, tuple, dict, type(None))
@@ -59,7 +58,7 @@ TEXT_METHODS = ("lower", "upper", "strip", "split", "replace", "startswith", "en
 
 
 def in_list(call: Callable[..., Any]) -> Callable[..., list[Any]]:
-    """A function that returns a list of what an iterator gives."""
+    """Return a function that returns a list of an iterator's values."""
     return lambda *arguments: list(call(*arguments))
 
 
@@ -91,30 +90,31 @@ PYTHON: Functions = {
 
 
 def power(base: Any, exponent: Any) -> Any:
-    """A power, in floats where the whole number would be long."""
+    """Return a power, in floats if the integer would be long."""
     if isinstance(base, int) and isinstance(exponent, int) and abs(base).bit_length() * exponent > LONGEST_POWER:
         return float(base) ** float(exponent)
     return base**exponent
 
 
 class Expression:
-    """The value of an expression of the allowed syntax, given the names and functions it may use."""
+    """Value of an expression of the allowed syntax, with the names and functions it may use."""
 
     def __init__(self, names: Mapping[str, Any], functions: Mapping[str, Callable[..., Any]]) -> None:
         self.names, self.functions = names, functions
 
     def evaluate(self, text: str) -> Any:
-        """Return the value; raises ``ValueError`` for what is not allowed, and what the operations raise."""
+        """Return the value. Raises ``ValueError`` for expressions that are not allowed, and the errors of the
+        operations."""
         return self.value(ast.parse(text.strip(), mode="eval").body)
 
     def value(self, node: ast.AST | None) -> Any:
         """Return the value of a part, which is one of ``VALUES``."""
         method = getattr(self, f"value_of_{type(node).__name__}", None)
         if method is None:
-            raise ValueError(f"{type(node).__name__} is no part of an expression that is read")
+            raise ValueError(f"{type(node).__name__} is not allowed in an expression")
         found = method(node)
         if not isinstance(found, VALUES):
-            raise ValueError(f"a value of type {type(found).__name__} is no part of an expression that is read")
+            raise ValueError(f"a value of type {type(found).__name__} is not allowed in an expression")
         return found
 
     def value_of_NoneType(self, node: None) -> Any:
@@ -171,18 +171,18 @@ class Expression:
         return self.value(node.value)[self.value(node.slice)]
 
     def value_of_Attribute(self, node: ast.Attribute) -> Any:
-        """The constant of a namespace (``math.pi``), or the item of a dictionary (``legs.length``)."""
+        """Return the constant of a namespace (``math.pi``), or the item of a dictionary (``legs.length``)."""
         if isinstance(node.value, ast.Name) and node.value.id == "math" and "math" not in self.names:
             return CONSTANTS[node.attr]
         holder = self.value(node.value)
         if not isinstance(holder, dict):
-            raise ValueError(f".{node.attr} stands behind what is no dictionary")
+            raise ValueError(f".{node.attr} follows a value that is not a dictionary")
         return holder[node.attr]
 
     def value_of_Call(self, node: ast.Call) -> Any:
         arguments = [self.value(part) for part in node.args]
         if any(part.arg is None for part in node.keywords):
-            raise ValueError("** is no part of an expression that is read")
+            raise ValueError("** is not allowed in an expression")
         options = {str(part.arg): self.value(part.value) for part in node.keywords}
         name = ast.unparse(node.func)
         if name in self.functions:
@@ -194,12 +194,12 @@ class Expression:
         raise NameError(
             f"name {name!r} is not defined"
             if isinstance(node.func, ast.Name)
-            else f"{name!r} is no function that is read"
+            else f"{name!r} is not an allowed function"
         )
 
 
 def restrict(xacro: Any, substitution: Any, folder: Path) -> None:
-    """Have the package evaluate its expressions here, and read files of the folder, or of its package, only."""
+    """Make the package evaluate its expressions here, and read files of the folder, or of its package, only."""
 
     def locate(spec: str) -> str:
         return located(spec, folder)
@@ -214,7 +214,7 @@ def restrict(xacro: Any, substitution: Any, folder: Path) -> None:
         raise ValueError(" ".join(map(str, texts)))
 
     def forbidden(*arguments: Any) -> None:
-        raise ValueError("this version of the package xacro evaluates what hrsynth does not expect")
+        raise ValueError("this version of the package xacro has an unexpected evaluation")
 
     given = xacro.substitution_args_context
     files: Functions = {"load_yaml": xacro.load_yaml, "abs_filename": locate, "dotify": dict}
@@ -250,8 +250,8 @@ def restrict(xacro: Any, substitution: Any, folder: Path) -> None:
 
 
 def located(spec: str, folder: Path) -> str:
-    """The file that an include names; raises ``ValueError`` for what lies outside of the folder (of the package), and
-    for a pattern of files."""
+    """Return the file that an include names. Raises ``ValueError`` for a file outside of the folder (of the package),
+    and for a pattern of files."""
     if any(letter in spec for letter in "*?["):
         raise ValueError(f"{spec} is a pattern of files")
     if MARK in spec:
@@ -271,8 +271,8 @@ def located(spec: str, folder: Path) -> str:
 
 
 def package_folders(folder: Path) -> list[Path]:
-    """The folders in which a package's files may lie: the file's own, and those up to the one that says that it is a
-    package; where none does, the one above, unless that is a root or a home."""
+    """Return the folders in which a package's files may lie: the file's own, and those up to the one with the package's
+    manifest; without one, the folder above, unless that is a root or a user's."""
     above = [folder, *folder.parents]
     for k, each in enumerate(above[: LEVELS + 1]):
         if any((each / name).is_file() for name in ("package.xml", "model.config")):
@@ -282,7 +282,7 @@ def package_folders(folder: Path) -> list[Path]:
 
 
 class PlacedBuilder(expatbuilder.ExpatBuilderNS):
-    """Builds a document whose elements know their ``place``: file and line."""
+    """Builder of a document whose elements know their ``place``: file and line."""
 
     def __init__(self, file: str) -> None:
         super().__init__()
@@ -300,7 +300,7 @@ class PlacedBuilder(expatbuilder.ExpatBuilderNS):
 
 
 def watched(xacro: Any) -> list[Any]:
-    """Have the package keep the places of elements; the element that it has in hand is the one in the list."""
+    """Make the package keep the places of elements; the list holds the element that it currently processes."""
     at: list[Any] = []
 
     def telling(call: Callable[..., Any]) -> Callable[..., Any]:
@@ -327,7 +327,7 @@ def watched(xacro: Any) -> list[Any]:
 
 
 def wrong(xacro: Any, error: Exception, at: list[Any]) -> dict[str, Any]:
-    """What an error says, with file and line."""
+    """Return the text of an error, with file and line."""
     files = [each for each in getattr(xacro, "filestack", None) or [] if each]
     file, line = getattr(at[0], "place", (None, None)) if at else (None, None)
     if hasattr(error, "lineno"):  # no XML
@@ -364,9 +364,9 @@ def main(name: str, largest: str, most: str) -> None:
         places = [getattr(each, "place", None) for each in made.getElementsByTagName("*")]
         text = made.toxml()
         if len(text) > int(largest):
-            raise ValueError(f"{len(text)} characters when expanded, allowed: {largest}")
+            raise ValueError(f"too long when expanded: got {len(text)} characters, expected up to {largest}")
         if len(places) > int(most):
-            raise ValueError(f"{len(places)} elements when expanded, allowed: {most}")
+            raise ValueError(f"too large when expanded: got {len(places)} elements, expected up to {most}")
     except Exception as error:
         errors.write(json.dumps(wrong(xacro, error, at)))
         sys.exit(1)

@@ -10,7 +10,7 @@ _TEXT, _BINARY = (b"#usda", b"#sdf"), (b"PXR-USDC", b"PK\x03\x04")
 
 
 def _pack(text: str, path: Path) -> bytes:
-    """A text as its file holds it: ``.usdc`` is binary."""
+    """Return the content of a file: ``.usdc`` is binary."""
     if path.suffix.lower() != ".usdc":
         return text.encode()
     from .stage import binary

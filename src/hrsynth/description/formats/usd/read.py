@@ -1,4 +1,4 @@
-"""USD: rigid bodies, the joints of UsdPhysics between them, drives as motors; units and the up axis of the stage."""
+"""Reader of USD: rigid bodies, joints of UsdPhysics between them, drives as motors; units and up axis of the stage."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ _MIMIC = re.compile(r"physxMimicJoint:(\w+):gearing")
 
 
 def read(file: RobotFile) -> JointGraph:
-    """The joint graph of a USD stage; raises ``BadRobotFile`` with all its defects, ``MissingExtra`` without the
+    """Return the joint graph of a USD stage. Raises ``BadRobotFile`` with all its defects, ``MissingExtra`` without the
     package of OpenUSD."""
     if file.start.startswith(b"PK"):
         raise xml.refusal(
             file.path,
-            "a zip archive, such as a package of USD files, which is not read",
-            "the robot file in it (unzip)",
+            "a zip archive, such as a package of USD files",
+            "the robot file in it, unzipped",
         )
     told = prims(file.path)
     return _StageReader(str(file.path), told).graph()
@@ -53,7 +53,7 @@ def read(file: RobotFile) -> JointGraph:
 
 @dataclass(eq=False)
 class _Prim:
-    """A prim: its values and relationships, its pose (4, 4) without scale in the z-up world in metres, its scale."""
+    """Prim: its values and relationships, its pose (4, 4) without scale in the z-up world in metres, its scale."""
 
     path: str
     kind: str
@@ -64,7 +64,7 @@ class _Prim:
     told: Mapping[str, Any]
     X: Array = field(default_factory=lambda: ORIGIN)
     M: Array = field(default_factory=lambda: np.eye(3))
-    """What turns and stretches its coordinates (3, 3), in metres."""
+    """Rotation and scale of its coordinates (3, 3), in metres."""
 
     def has(self, api: str) -> bool:
         return any(each == api or each.startswith(api + ":") for each in self.apis)
@@ -76,9 +76,9 @@ class _StageReader:
     told: Mapping[str, Any]
     defects: list[Defect] = field(default_factory=list)
     bodies: dict[str, str] = field(default_factory=dict)
-    """The link of each rigid body, by the path of its prim."""
+    """Link of each rigid body, by the path of its prim."""
     titles: dict[str, list[str]] = field(default_factory=dict)
-    """The joints that each joint is read as, by the path of its prim."""
+    """Joints that each joint is read as, by the path of its prim."""
 
     def defect(self, path: str, what: str, value: object = None, allowed: str | None = None) -> None:
         found = None if value is None else str(value)
@@ -89,7 +89,7 @@ class _StageReader:
             raise BadRobotFile(self.defects)
 
     def graph(self) -> JointGraph:
-        """Bodies, joints, drives, and what our writer adds."""
+        """Return the bodies, joints, drives, and annotations of our writer."""
         told = self.told
         self.metres = self._positive("metersPerUnit", told["metres"])
         self.kilograms = self._positive("kilogramsPerUnit", told["kilograms"])
@@ -100,9 +100,9 @@ class _StageReader:
         name = own[0].values.get(f"{PREFIX}:name") if own else None
         graph = self.result = JointGraph(str(name or told["name"] or "robot"), self.file, "USD")
         if not told["metres_told"]:
-            graph.note("guess", "lengths are in centimetres, USD's default without metersPerUnit")
+            graph.note("assumption", "lengths are in centimetres, USD's default without metersPerUnit")
         if told["missing"]:
-            graph.note("ignored", f"contents of other files, which are missing: {comma_list(told['missing'])}")
+            graph.note("ignored", f"contents of missing files: {comma_list(told['missing'])}")
         for prim in self.prims.values():
             if prim.has("PhysicsRigidBodyAPI"):
                 self._body(prim)
@@ -142,11 +142,11 @@ class _StageReader:
 
     def _positive(self, what: str, value: float) -> float:
         if not 0 < value <= LARGEST_NUMBER:
-            self.defect("/", what, value, "a number above zero")
+            self.defect("/", what, value, "a number above 0")
         return float(value)
 
     def _prim(self, told: Mapping[str, Any]) -> _Prim:
-        """A prim where it stands: USD's matrices act on rows, and its lengths are in units of the stage."""
+        """Return a prim with its pose: USD's matrices act on rows, and its lengths are in units of the stage."""
         values, label = told["values"], told["values"].get(f"{PREFIX}:name")
         name = label if isinstance(label, str) and label else told["name"]
         found = _Prim(told["path"], told["type"], tuple(told["apis"]), values, told["relations"], name, told)
@@ -154,13 +154,13 @@ class _StageReader:
             return found
         W = np.array(told["X"], dtype=float).T
         if not np.all(np.abs(W) <= LARGEST_NUMBER):
-            self.defect(found.path, "a transform that is not finite or too large")
+            self.defect(found.path, "transform not finite or too large")
             return found
         found.M = self.metres * (self.up[:3, :3] @ W[:3, :3])
         U, sizes, V = np.linalg.svd(W[:3, :3])
         if not sizes[-1] > WITHOUT_DIRECTION * max(1.0, sizes[0]):
             if told["shape"] or found.has("PhysicsRigidBodyAPI"):
-                self.defect(found.path, "a transform with zero volume")
+                self.defect(found.path, "transform with zero volume")
             return found
         R = W[:3, :3] if np.max(np.abs(W[:3, :3].T @ W[:3, :3] - np.eye(3))) < EXACT else U @ V
         R = -R if np.linalg.det(R) < 0 else R
@@ -176,7 +176,7 @@ class _StageReader:
         self.bodies[prim.path] = name
 
     def _carrier(self, path: str) -> str | None:
-        """The body that a prim belongs to: itself or the nearest one above it; None for the world."""
+        """Return the body that a prim belongs to: itself or the nearest one above it; None for the world."""
         while path and path != "/":
             if path in self.bodies:
                 return path
@@ -184,7 +184,7 @@ class _StageReader:
         return None
 
     def _contents(self) -> None:
-        """Masses and shapes of the bodies."""
+        """Read masses and shapes of the bodies."""
         inertials = {path: self._inertial(self.prims[path]) for path in self.bodies}
         solids: dict[str, list[Solid]] = {path: [] for path in self.bodies}
         lost = []
@@ -198,13 +198,13 @@ class _StageReader:
             else:
                 solids[carrier].append(solid)
         if lost:
-            self.result.note("ignored", f"{len(lost)} shapes that other dialects do not have: {comma_list(lost)}")
+            self.result.note("ignored", f"{len(lost)} shapes that other formats do not have: {comma_list(lost)}")
         for path, link in self.bodies.items():
             content = fragments(Content(inertials[path], tuple(solids[path])))
             self.result.links[link] = Link(link, xml=content)
 
     def _inertial(self, prim: _Prim) -> Inertial | None:
-        """UsdPhysics: a mass of zero is one that the simulator computes, as are moments of zero."""
+        """Return an inertia of UsdPhysics; a mass or moments of zero are computed by the simulator, and left out."""
         values = prim.values
         mass = _number(values.get("physics:mass"))
         if not mass > 0:
@@ -224,7 +224,7 @@ class _StageReader:
         return Inertial(mass * self.kilograms, frozen(pose(centre)), frozen(inertia))
 
     def _solid(self, prim: _Prim, body: _Prim) -> Solid | None:
-        """A shape in the frame of its body, where its kind and its stretching can be told."""
+        """Return a shape in the frame of its body, if its kind and scale are known."""
         values, X = prim.values, inverse(body.X) @ prim.X
         stretch = prim.X[:3, :3].T @ prim.M
         sizes = np.diag(stretch)
@@ -268,19 +268,19 @@ class _StageReader:
         return bool(prim.told["guide"])
 
     def _joint(self, prim: _Prim) -> None:
-        """A joint: its frames on its two bodies, what it leaves free."""
+        """Add a joint: its frames on its two bodies and the directions that it leaves free."""
         graph, values = self.result, prim.values
         if values.get("physics:jointEnabled") is False:
             graph.note("ignored", f"the joint {prim.name!r}, which is not enabled")
             return
         if prim.kind == "PhysicsDistanceJoint":
-            self.defect(prim.path, "a distance joint", None, "two spherical joints and the rod between them")
+            self.defect(prim.path, "distance joint", None, "two spherical joints and the rod between them")
             return
         if not prim.kind.startswith("Physics") or not prim.kind.endswith("Joint"):
             graph.note(
                 "ignored",
-                f"the joint {prim.name!r} of type {prim.kind or 'none'}, which UsdPhysics does not "
-                "have; --close says what it holds together",
+                f"the joint {prim.name!r} of type {prim.kind or 'none'}, unknown in UsdPhysics "
+                "(--close adds a closure)",
             )
             return
         ends = [self._end(prim, side) for side in (0, 1)]
@@ -288,7 +288,7 @@ class _StageReader:
             return
         one, two = ends[0], ends[1]
         if one.link == two.link:
-            self.defect(prim.path, "a joint of a body to itself", one.link, "two bodies (physics:body0, physics:body1)")
+            self.defect(prim.path, "joint from a body to itself", one.link, "two bodies (physics:body0, physics:body1)")
             return
         name = fresh_name(prim.name, graph.joints)
         free = self._freedoms(prim)
@@ -298,7 +298,7 @@ class _StageReader:
         self.titles[prim.path] = [each for each in graph.joints if each not in before]
 
     def _end(self, prim: _Prim, side: int) -> FrameSpec | None:
-        """The joint's frame on one of its bodies (on the world where none is named)."""
+        """Return the joint's frame on one of its bodies (on the world if none is named)."""
         targets = prim.relations.get(f"physics:body{side}", [])
         if len(targets) > 1 or (targets and targets[0] not in self.prims):
             self.defect(prim.path, f"physics:body{side}", " ".join(targets)[:80], "one prim of the stage")
@@ -320,7 +320,7 @@ class _StageReader:
         return FrameSpec(self.bodies[carrier], frozen(X if carrier == "/" else inverse(body.X) @ X))
 
     def _freedoms(self, prim: _Prim) -> tuple[str, ...]:
-        """What a joint leaves free: of one of its own type that, of a D6 what no limit locks."""
+        """Return the directions that a joint leaves free: by its type, or for a D6 those that no limit locks."""
         axis = str(prim.values.get("physics:axis", "X"))
         kind = _KINDS.get(prim.kind)
         if kind is not None and axis not in AXES:
@@ -343,7 +343,7 @@ class _StageReader:
     def _add(
         self, name: str, prim: _Prim, ends: tuple[FrameSpec, FrameSpec], free: tuple[str, ...], *, in_tree: bool
     ) -> None:
-        """One joint, or a chain of slides and turns where no type leaves just these free."""
+        """Add one joint, or a chain of P and R if no joint type leaves exactly these directions free."""
         axes: tuple[Array, ...]
         slides, turns = ([AXES[each[-1]] for each in free if each.startswith(word)] for word in ("trans", "rot"))
         letters = "".join(each[-1] for each in free)
@@ -354,7 +354,7 @@ class _StageReader:
             case (1, 0) | (0, 1):
                 kind, axes = (JointType.PRISMATIC if slides else JointType.REVOLUTE), tuple(slides + turns)
             case 0, 2:
-                # PhysX turns the predecessor's swing (Y, Z) first, the successor's twist (X) last
+                # PhysX rotates the predecessor's swing (Y, Z) first, the successor's twist (X) last
                 kind, axes = JointType.UNIVERSAL, (turns[1], turns[0])
                 if letters == "YZ":
                     axes = (turns[0], turns[1])
@@ -389,8 +389,8 @@ class _StageReader:
             before = FrameSpec(title)
 
     def _limits(self, prim: _Prim, free: tuple[str, ...]) -> Limits | None:
-        """Degrees and units of the stage as radians and metres, of joints of one freedom or with the same limits in
-        all."""
+        """Return limits in degrees and units of the stage as radians and metres, for one-dof joints or equal limits in
+        all directions."""
         pairs = []
         for each in free:
             factor = math.pi / 180 if each.startswith("rot") else self.metres
@@ -422,16 +422,16 @@ class _StageReader:
         return Limits(**values) if any(value is not None for value in values.values()) else None
 
     def _hold_kinematic(self) -> None:
-        """Kinematic bodies stand still in the world."""
+        """Fix kinematic bodies in the world."""
         for path, link in self.bodies.items():
             if self.prims[path].values.get("physics:kinematicEnabled") is True:
                 name = self.result.fresh(f"{link}_held")
                 ends = FrameSpec(self.world, self.prims[path].X), FrameSpec(link)
                 self.result.joints[name] = JointSpec(name, JointType.FIXED, ends)
-                self.result.note("merged", f"the kinematic body {link!r} stands still in the world")
+                self.result.note("merged", f"the kinematic body {link!r} is fixed in the world")
 
     def _mimics(self, joints: list[_Prim]) -> None:
-        """PhysX's mimic joints: q + gearing × q of the reference + offset = 0."""
+        """Add the couplings of PhysX's mimic joints: q + gearing × q of the reference + offset = 0."""
         for prim in joints:
             for key, gearing in prim.values.items():
                 match = _MIMIC.fullmatch(key)
@@ -444,7 +444,9 @@ class _StageReader:
                 types = {self.result.joints[name].type for name in names}
                 turns = types == {JointType.REVOLUTE}
                 if not turns and types != {JointType.PRISMATIC}:
-                    self.defect(prim.path, "a mimic of joints of two kinds", None, "two revolute or two prismatic ones")
+                    self.defect(
+                        prim.path, "mimic between joints of different types", None, "two revolute or two prismatic ones"
+                    )
                     continue
                 exact = prim.values.get(f"{PREFIX}:ratio")
                 ratio = -float(gearing)
@@ -456,7 +458,7 @@ class _StageReader:
                 self.result.gears.append(CouplingSpec(title, *names, ratio, offset or 0.0))
 
     def _stand(self, graph: JointGraph) -> None:
-        """Joints count from where the file puts their bodies, where that is a motion of theirs."""
+        """Count joints from the file's poses of their bodies, if these are reached by the joint's motion."""
         apart = []
         for name, joint in graph.joints.items():
             T, S = joint.frames(self.poses)
@@ -485,13 +487,13 @@ class _StageReader:
             graph.joints[name] = replace(joint, ends=(near, joint.ends[1]), axes=axes, limits=limits)
         if apart:
             graph.note(
-                "guess",
-                "the bodies of these joints do not lie where the joints hold them, and are put there: "
+                "assumption",
+                "the bodies of these joints do not lie where the joints put them, and are moved there: "
                 + comma_list(apart),
             )
 
     def _says(self, prim: _Prim) -> None:
-        """Platform, camera, motors, observations, as our writer adds them."""
+        """Read platform, camera, motors and observations as our writer adds them."""
         for text in prim.values[f"{PREFIX}:says"] or []:
             key, _, rest = str(text).partition(" ")
             wrong = read_annotation(self.result, key, rest)
@@ -499,8 +501,8 @@ class _StageReader:
                 self.defect(prim.path, wrong, str(text)[:80])
 
     def _drives(self, joints: list[_Prim]) -> None:
-        """Joints whose drives have gains are driven; where none has, all that have drives. MuJoCo's actuators name
-        theirs."""
+        """Put motors on joints whose drives have gains; if none has gains, on all with drives. MuJoCo's actuators name
+        their joints."""
         gains: dict[str, bool] = {}
         for prim in joints:
             names = [each for each in self.titles.get(prim.path, []) if self.result.joints[each].kind.freedoms]
@@ -524,8 +526,8 @@ class _StageReader:
         for name in driven:
             self.result.joints[name] = replace(self.result.joints[name], motor=Motor(f"motor_{name}"))
         if len(driven) < len(gains):
-            what = f"the motors are {comma_list(driven)}: the joints whose drives have gains (--motors to change them)"
-            self.result.note("guess", what)
+            what = f"the motors are {comma_list(driven)}: the joints whose drives have gains (--motors changes them)"
+            self.result.note("assumption", what)
 
 
 def _is_locked(values: Mapping[str, Any], freedom: str) -> bool:
@@ -534,14 +536,14 @@ def _is_locked(values: Mapping[str, Any], freedom: str) -> bool:
 
 
 def _number(value: Any) -> float:
-    """A number of single precision as the decimals that were meant."""
+    """Return a number of single precision as the decimals from which it was rounded."""
     if not isinstance(value, int | float) or not math.isfinite(value):
         return 0.0
     return float(str(np.float32(value))) if float(np.float32(value)) == value else float(value)
 
 
 def _vector(value: Any, exact: Any = None) -> Array | None:
-    """Three finite numbers; those of double precision beside them where they are the same."""
+    """Return three finite numbers; those of double precision next to them if they are the same."""
     found = np.array(value, dtype=float) if isinstance(value, list) and len(value) == 3 else None
     if found is None or not np.all(np.isfinite(found)):
         return None
@@ -553,7 +555,7 @@ def _vector(value: Any, exact: Any = None) -> Array | None:
 
 
 def _quaternion(value: Any, exact: Any = None) -> Array | None:
-    """A quaternion w x y z as it is written, in the same manner; None for what is none."""
+    """Return a quaternion w x y z as it is written, in the same manner; None if it is invalid."""
     found = np.array(value, dtype=float) if isinstance(value, list) and len(value) == 4 else None
     if found is None or not np.linalg.norm(found) > WITHOUT_DIRECTION or not np.all(np.isfinite(found)):
         return None

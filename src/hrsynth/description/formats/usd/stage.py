@@ -1,4 +1,4 @@
-"""Stages of USD, opened in a process of their own: a file that breaks OpenUSD's library breaks nothing else."""
+"""Stages of USD, opened in a separate process: a file that breaks OpenUSD's library breaks nothing else."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ PROCESS = Path(__file__).with_name("stage_process.py")
 
 
 def prims(path: Path) -> dict[str, Any]:
-    """What a stage holds, as plain values: ``stage`` and ``prims``; raises ``BadRobotFile``, and ``MissingExtra`` where
-    OpenUSD's package is not installed."""
+    """Return the content of a stage as plain values: ``stage`` and ``prims``. Raises ``BadRobotFile``, and
+    ``MissingExtra`` if OpenUSD's package is not installed."""
     found: dict[str, Any] = json.loads(_run(path, "prims", str(path)))
     return found
 
 
 def meshes(asked: Mapping[Path, Sequence[str]]) -> list[list[str]]:
-    """Meshes of stages, by their prims, each as the text of an ``.obj`` file in its own frame and units: all in one
-    process."""
+    """Return meshes of stages, by their prims, each as the text of an ``.obj`` file in its own frame and units: all in
+    one process."""
     paths = [*asked]
     given = json.dumps({str(path): [*prims] for path, prims in asked.items()})
     found: list[list[str]] = json.loads(_run(paths[0], "meshes", str(paths[0]), given=given)) if paths else []
@@ -35,7 +35,7 @@ def meshes(asked: Mapping[Path, Sequence[str]]) -> list[list[str]]:
 
 
 def binary(text: str, path: Path) -> bytes:
-    """The binary form, for ``path``, of a stage given as text; raises ``BadRequest`` where there is no room for
+    """Return the binary form, for ``path``, of a stage given as text. Raises ``BadRequest`` if there is no room for
     temporary files."""
     _require_package(path)
     try:

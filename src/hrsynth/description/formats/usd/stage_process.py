@@ -1,5 +1,5 @@
-"""Run by :func:`untrusted.output`: what a USD stage holds as JSON, meshes of stages, or a binary
-form. Layers are composed only from the stage's own folder."""
+"""Process run by :func:`untrusted.output`: the content of a USD stage as JSON, meshes of stages, or a binary form.
+Layers are composed only from the stage's own folder."""
 
 from __future__ import annotations
 
@@ -13,14 +13,13 @@ from typing import Any
 from hrsynth.untrusted import refuse
 
 LISTED = 64
-"""Entries of an array beyond which only their number is told."""
+"""Entries of an array beyond which only their number is returned."""
 MOST_PRIMS = 50_000
 ENDINGS = (".usd", ".usda", ".usdc")
 
 
 def require_inside(start: Path, largest: int, most: int) -> list[str]:
-    """Refuse a stage whose layers lie elsewhere than in its folder and below, are too many or too large; those that are
-    not there are given back."""
+    """Refuse a stage whose layers lie outside of its folder, are too many or too large; return the missing ones."""
     from pxr import Sdf  # type: ignore[import-untyped]
 
     folder, pending, seen, size = start.resolve().parent, [Path(os.path.abspath(start))], set(), 0
@@ -32,9 +31,9 @@ def require_inside(start: Path, largest: int, most: int) -> list[str]:
         seen.add(path)
         size += path.stat().st_size
         if size > largest:
-            refuse(f"layers too large, allowed: up to {largest} bytes together")
+            refuse(f"layers too large together: expected up to {largest} bytes")
         if len(seen) > most:
-            refuse(f"too many layers, allowed: up to {most}")
+            refuse(f"too many layers: expected up to {most}")
         layer = Sdf.Layer.FindOrOpen(str(path))
         if layer is None:
             refuse(f"OpenUSD does not open {path.name}")
@@ -46,14 +45,14 @@ def require_inside(start: Path, largest: int, most: int) -> list[str]:
 
         layer.Traverse(Sdf.Path.absoluteRootPath, look)
         if clips:
-            refuse(f"value clips, which are not read, found {clips[0]}")
+            refuse(f"value clips are not read: got {clips[0]}")
         for asset in filter(None, layer.GetCompositionAssetDependencies()):  # an internal reference names none
-            cure = "allowed: layers in the file's folder (usdcat --flatten makes one of all)"
+            cure = "expected layers in the file's folder. Merge all layers with usdcat --flatten."
             other = Path(os.path.normpath(path.parent / asset)) if "`" not in asset and "://" not in asset else None
             if other is None or not other.resolve().is_relative_to(folder):
-                refuse(f"a layer outside of the file's folder, found {asset}, {cure}")
+                refuse(f"layer outside of the file's folder: got {asset}, {cure}")
             elif other.suffix.lower() not in ENDINGS:
-                refuse(f"a layer that is not a USD file, found {asset}, allowed: {', '.join(ENDINGS)}")
+                refuse(f"not a USD file as a layer: got {asset}, expected {', '.join(ENDINGS)}")
             elif other.is_file():
                 pending.append(other)
             else:
@@ -62,7 +61,7 @@ def require_inside(start: Path, largest: int, most: int) -> list[str]:
 
 
 def plain(value: Any) -> Any:
-    """A value of USD as one of JSON: quaternions as w x y z, matrices as rows, long arrays as their number."""
+    """Return a value of USD as one of JSON: quaternions as w x y z, matrices as rows, long arrays as their number."""
     if value is None or isinstance(value, bool | int | float | str):
         return value
     if hasattr(value, "GetImaginary"):
@@ -78,8 +77,8 @@ def plain(value: Any) -> Any:
 
 
 def colour_of(prim: Any) -> Any:
-    """The colour of a shape, or of what stands for a missing mesh: its display colour, else that of its bound preview
-    surface."""
+    """Return the colour of a shape, or of the placeholder of a missing mesh: its display colour, else that of its bound
+    preview surface."""
     from pxr import UsdGeom, UsdShade
 
     own, clear = (
@@ -95,13 +94,13 @@ def colour_of(prim: Any) -> Any:
 
 
 def told(stage: Any) -> dict[str, Any]:
-    """The stage's units and all prims that may matter: shapes, joints, what carries a schema of physics."""
+    """Return the stage's units and all relevant prims: shapes, joints, and prims with a schema of UsdPhysics."""
     from pxr import Usd, UsdGeom, UsdPhysics
 
     found, cache = [], UsdGeom.XformCache()
     for number, prim in enumerate(Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies())):
         if number > MOST_PRIMS:
-            refuse(f"too many prims, allowed: up to {MOST_PRIMS}")
+            refuse(f"too many prims: expected up to {MOST_PRIMS}")
         kind, apis = str(prim.GetTypeName()), [str(each) for each in prim.GetAppliedSchemas()]
         relations = {str(each.GetName()): [str(to) for to in each.GetTargets()] for each in prim.GetRelationships()}
         shape, joint = prim.IsA(UsdGeom.Gprim), kind.endswith("Joint") and "physics:body1" in {**relations}
@@ -138,7 +137,7 @@ def told(stage: Any) -> dict[str, Any]:
 
 
 def obj(stage: Any, path: str) -> str:
-    """A mesh as the text of an .obj file."""
+    """Return a mesh as the text of an .obj file."""
     from pxr import UsdGeom
 
     mesh = UsdGeom.Mesh(stage.GetPrimAtPath(path))
@@ -158,7 +157,7 @@ def obj(stage: Any, path: str) -> str:
 
 
 def main(largest: str, most: str, task: str, name: str, *rest: str) -> None:
-    """One task on one file."""
+    """Run one task on one file."""
     try:
         from pxr import Tf, Usd
     except ImportError as error:
@@ -179,7 +178,7 @@ def main(largest: str, most: str, task: str, name: str, *rest: str) -> None:
         what = text.partition(" : ")[2] or text or type(error).__name__
         place = re.search(r"([^'/]*):(\d+):\d+: ", what)
         refuse(
-            f"OpenUSD cannot read {place[1]} from line {place[2]} on, allowed: a whole stage"
+            f"OpenUSD cannot read {place[1]} from line {place[2]} on: expected a whole stage"
             if place
-            else f"OpenUSD refuses it: {what[:300]}, allowed: a whole stage"
+            else f"OpenUSD refuses it: {what[:300]}"
         )

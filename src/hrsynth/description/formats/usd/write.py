@@ -1,8 +1,7 @@
-"""A mechanism as USD text: rigid bodies of an articulation, joints of UsdPhysics, loops excluded from the articulation.
+"""Writer of USD text: rigid bodies of an articulation, joints of UsdPhysics, loops excluded from the articulation.
 
-UsdPhysics holds joint frames, limits and masses in single precision, angles in degrees. The same numbers stand beside
-them in double precision, as attributes ``hrsynth:…`` that other programs leave alone; reading takes those as long as
-they agree.
+UsdPhysics holds joint frames, limits and masses in single precision, angles in degrees. The same numbers are next to
+them in double precision, as attributes ``hrsynth:…`` that other programs ignore; reading prefers those if they agree.
 """
 
 from __future__ import annotations
@@ -42,11 +41,12 @@ _FREE = {
     JointType.FREE: FREEDOMS,
     JointType.FIXED: (),
 }
-"""What each type leaves free in frames whose x is the axis (of a universal joint the second; y is the first)."""
+"""Directions that each type leaves free in frames whose x is the axis (of a universal joint the second; y is the
+first)."""
 
 
 def write(mechanism: Mechanism) -> Written:
-    """The USD text of a mechanism, and warnings of what it has no place for."""
+    """Return the USD text of a mechanism, and warnings of losses."""
     robot = spanning(mechanism)
     return _UsdWriter(robot).write()
 
@@ -104,7 +104,7 @@ class _UsdWriter:
             and (joint.limits.lower, joint.limits.upper) != (None, None)
         ]
         if wide:
-            what = "limits of the turns of spherical joints are not written: "
+            what = "limits of spherical joints are not written: "
             self.lost.append(Note("warning", what + comma_list(wide)))
         return Written((text,), tuple(self.lost))
 
@@ -133,7 +133,7 @@ class _UsdWriter:
         return _prim("Xform", self.names[name], lines, apis)
 
     def _solid(self, link: str, solid: Solid, taken: dict[str, int], unread: list[str]) -> list[str]:
-        """A shape; a mesh with its triangles and, for the way back, the name of its file."""
+        """Return a shape; a mesh with its triangles and, for reading it again, the name of its file."""
         title = _identifier(solid.name or solid.role, taken)
         lines = [f"custom string {PREFIX}:name = {_text(solid.name)}"] if solid.name else []
         if solid.role == "collision":
@@ -175,7 +175,7 @@ class _UsdWriter:
         return _prim(kind, title, [*lines, *_transform_of(solid.X, scale)], apis)
 
     def _joint(self, joint: Joint) -> list[str]:
-        """A joint between two bodies; what is no type of its own is a D6 whose other directions are locked."""
+        """Return a joint between two bodies; joints without a type of USD are D6 whose other directions are locked."""
         robot, kind = self.robot, joint.type
         X_J = pose(joint.point, _frame(joint, robot))
         lines = _label(joint.name, self.joints[joint.name])
@@ -207,14 +207,14 @@ class _UsdWriter:
         return _prim(_TYPES.get(kind, "PhysicsJoint"), self.joints[joint.name], lines, apis)
 
     def _mimic(self, joint: Joint, free: tuple[str, ...], apis: list[str]) -> Iterator[str]:
-        """A gear in PhysX's words: q + gearing × q of the reference = 0."""
+        """Return a coupling in PhysX's form: q + gearing × q of the reference = 0."""
         carriers = {each.successor: each for each in self.robot.joints.values() if each.in_tree}
         for gear in self.robot.couplings:
             if carriers.get(gear.successor) is not joint:
                 continue
             other = carriers[gear.predecessor]
             if len(free) != 1 or other.type is not joint.type:
-                what = f"USD has no gear between a turn and a slide; not written: {gear.name}"
+                what = f"USD has no coupling between a rotation and a translation; not written: {gear.name}"
                 self.lost.append(Note("warning", what))
                 continue
             stem = f"physxMimicJoint:{free[0]}:"
@@ -227,7 +227,8 @@ class _UsdWriter:
 
 
 def _frame(joint: Joint, robot: Mechanism) -> Array:
-    """A rotation (3, 3) with x along the axis; of a universal joint x along the second axis, y along the first."""
+    """Return a rotation (3, 3) with x along the axis; of a universal joint x along the second axis, y along the
+    first."""
     if not joint.axes:
         return robot.links[joint.successor].pose[:3, :3]
     x = joint.axes[-1]
@@ -255,7 +256,7 @@ def _limits(kind: JointType, limits: Limits, free: tuple[str, ...], apis: list[s
 
 
 def _drive(kind: JointType, limits: Limits | None, free: tuple[str, ...], apis: list[str]) -> Iterator[str]:
-    """A drive without gains (whoever runs a simulator chooses them) for each freedom."""
+    """Return a drive without gains (the simulator's user chooses them) for each coordinate."""
     words = {JointType.REVOLUTE: ("angular",), JointType.PRISMATIC: ("linear",)}.get(kind, free)
     for word in words:
         apis.append(f"PhysicsDriveAPI:{word}")
@@ -265,7 +266,7 @@ def _drive(kind: JointType, limits: Limits | None, free: tuple[str, ...], apis: 
 
 
 def _prim(kind: str, name: str, lines: Iterable[str], apis: Iterable[str] = ()) -> list[str]:
-    """A prim: its schemas, and what it holds, one step further in."""
+    """Return a prim: its schemas, and its content, indented."""
     schemas = ", ".join(map(_text, apis))
     head = (
         [f"def {kind} {_text(name)} (", f"    prepend apiSchemas = [{schemas}]", ")"]
@@ -276,7 +277,7 @@ def _prim(kind: str, name: str, lines: Iterable[str], apis: Iterable[str] = ()) 
 
 
 def _transform_of(X: Array, scale: tuple[float, ...] = (1.0, 1.0, 1.0)) -> list[str]:
-    """The transform of a prim in its parent's frame."""
+    """Return the transform of a prim in its parent's frame."""
     found, order = [], []
     if np.any(X[:3, 3]):
         found.append(f"double3 xformOp:translate = {_tuple(X[:3, 3])}")
@@ -291,12 +292,12 @@ def _transform_of(X: Array, scale: tuple[float, ...] = (1.0, 1.0, 1.0)) -> list[
 
 
 def _label(name: str, identifier: str) -> list[str]:
-    """The name where USD's identifiers have no room for it."""
+    """Return the name if USD's identifiers cannot hold it."""
     return [] if name == identifier else [f"custom string {PREFIX}:name = {_text(name)}"]
 
 
 def _identifier(name: str, taken: dict[str, int]) -> str:
-    """A name of letters, digits and underscores, which no prim beside it has."""
+    """Return a name of letters, digits and underscores that no sibling has."""
     plain = re.sub(r"\W", "_", name, flags=re.ASCII) or "_"
     plain = plain if not plain[0].isdigit() else f"_{plain}"
     found, number = plain, 2
@@ -307,7 +308,7 @@ def _identifier(name: str, taken: dict[str, int]) -> str:
 
 
 def _text(value: str) -> str:
-    """A text in quotes."""
+    """Return a text in quotes."""
     return json.dumps(value, ensure_ascii=False)
 
 
