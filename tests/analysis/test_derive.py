@@ -361,7 +361,7 @@ def test_unobserved_legs_near_a_fold(seed: int) -> None:
 def test_nothing_is_answered_without_a_certificate(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where even the lift is refused no leg is called blind."""
     refused = EquivalenceCheck(3, 0, 1.0, 1e9, 0.0, False, "refused")
-    monkeypatch.setattr("hrsynth.analysis.derive.certify", lambda *args, **options: refused)
+    monkeypatch.setattr("hrsynth.analysis.derive.check_equivalence", lambda *args, **options: refused)
     with pytest.raises(NoEquivalentRobot) as caught:
         derive(load("3rrr_m1"))
     assert caught.value.exit_status == 3

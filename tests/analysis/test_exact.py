@@ -442,8 +442,8 @@ def test_the_architecture_in_a_derivation(robot: str, observe: None, verdict: st
     record = found.to_dict()["architecture"]
     assert record.pop("chance") == (pytest.approx(8e-17, rel=0.2) if "chance" in words else 0)
     basis = record.pop("relations")
-    assert (basis["kept"] > 0) == (robot in ("quattro_rigid", "uranesx"))
-    assert basis["observed"] == []
+    assert (basis["loop_invariant"] > 0) == (robot in ("quattro_rigid", "uranesx"))
+    assert basis["sampled"] == []
     assert record == {
         "verdict": verdict,
         "exact": True,

@@ -409,7 +409,7 @@ def test_the_record_of_a_body_and_a_fixed_one(tmp_path):
         '<observe kind="position" leg="q" camera="c2" link="b1" at="0 0 0"/> </hrsynth> </robot>'
     )
     found = derive(file).to_dict()
-    assert found["mobility"]["as_written"] == {"total": 6, "idle": 0}
+    assert found["mobility"]["as_written"] == {"total": 6, "internal": 0}
     assert found["rank"] == 5
 
 

@@ -115,7 +115,7 @@ def test_what_no_segment_tells_is_answered_and_viewed(legs: int, tmp_path: Path)
 WAY: dict[str, object] = {"start": "x=0", "goal": "x=0.01"}
 GIVEN: dict[str, dict[str, object]] = {
     "accuracy": {"cone": "0.1deg"},
-    "basins": {"to": "x=0", "grid": "x=0:0.1:2"},
+    "basins": {"goal": "x=0", "grid": "x=0:0.1:2"},
     "path": WAY,
     "select": WAY,
     "servo": WAY,
@@ -126,7 +126,7 @@ GIVEN: dict[str, dict[str, object]] = {
 @pytest.mark.parametrize("command", sorted(analyses().keys() - {"check", "view"}))
 def test_every_other_question_asks_for_the_platform(command: str):
     for robot in (opened("3rrr_m1"), load(tree(2, 2))):
-        with pytest.raises(NoPlatform, match="allowed: --platform LINK"):
+        with pytest.raises(NoPlatform, match="expected --platform LINK"):
             getattr(hrsynth, command)(robot, **GIVEN.get(command, {}))
     assert isinstance(hrsynth.check(opened("3rrr_m1")), LoopCheck)
 

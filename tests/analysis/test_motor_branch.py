@@ -253,7 +253,7 @@ def test_tubes_hold_what_small_steps_find(name, half):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("name", "least", "effort"), [("quattro", 0.009, 100), ("hexa", 0.004, 100)])
+@pytest.mark.parametrize(("name", "least", "max_cells"), [("quattro", 0.009, 100), ("hexa", 0.004, 100)])
 def test_a_box_much_too_large_is_proved_about_zero(name, least, max_cells):
     """Whole turns of four and six motors: cells no larger than the one about zero that is proved, most of which are."""
     proof = branch(name, max_cells=max_cells)

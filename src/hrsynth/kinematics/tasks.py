@@ -249,7 +249,7 @@ class TaskBatch:
                 [
                     np.concatenate(
                         [
-                            o.apart(*pair)
+                            o.difference(*pair)
                             for o, *pair in zip(self.observations, *(np.split(row, ends) for row in rows), strict=True)
                         ]
                     )

@@ -494,9 +494,9 @@ class _Work:
             )
         except HrsynthError as error:
             return replace(candidate, run=Decision("refused", str(error)), discarded=f"the run is refused: {error}")
-        run = Decision(found.ended, found.run_outcome.reason)
-        if found.ended != GOAL:
-            return replace(candidate, run=run, discarded=f"the simulated run ends in: {found.ended} ({run.reason})")
+        run = Decision(found.outcome, found.run_outcome.reason)
+        if found.outcome != GOAL:
+            return replace(candidate, run=run, discarded=f"the simulated run ends in: {found.outcome} ({run.reason})")
         return self.look(replace(candidate, run=run), found.run.configurations)
 
 

@@ -79,7 +79,7 @@ def test_four_points_are_on_all_danger_cylinders() -> None:
 
 @pytest.mark.some(2)
 @pytest.mark.parametrize(
-    ("see", "words"),
+    ("sensor", "words"),
     [
         (LINES, "the normals n4, n5, n6 are parallel to one plane"),
         (
@@ -107,7 +107,7 @@ def test_points_on_one_line() -> None:
 
 
 @pytest.mark.parametrize(
-    ("see", "words", "expression"),
+    ("sensor", "words", "expression"),
     [
         (
             LINES,
@@ -143,7 +143,7 @@ def test_closed_conditions(sensor: list[str], words: str, expression: str) -> No
 
 @pytest.mark.some(0, 5)
 @pytest.mark.parametrize(
-    ("robot", "camera", "see", "words"),
+    ("robot", "camera", "sensor", "words"),
     [
         (
             "gough_stewart",
@@ -188,7 +188,7 @@ def test_words_expression_and_rank_agree(robot: str, camera: str | list[str], se
 
 @pytest.mark.some(1)
 @pytest.mark.parametrize(
-    "see",
+    "sensor",
     [
         ["image_circle:platform@0.1,0,0.1/0,1,1/0.05", "point:platform@0,0.1,0"],
         ["line:platform@0.1,0,0.1/0,1,1", "distance:platform@0,0.1,0", "depth:platform@0.3,0,0"],
@@ -220,7 +220,7 @@ def slider_crank() -> Mechanism:
 @pytest.mark.slow
 @pytest.mark.some(1)
 @pytest.mark.parametrize(
-    ("see", "camera"),
+    ("sensor", "camera"),
     [
         ("distance:platform@0,0,0", "eye=base@-0.1,0.2,0"),
         ("encoder:slide", None),
