@@ -27,7 +27,7 @@ from .instances import Instance
 
 
 def are_kept(every: Sequence[GeometricIncidence], relations: Incidences, found: Instance) -> list[bool]:
-    """Which of the relations all motions of an instance keep to first order."""
+    """Return the incidences that all motions of an instance preserve to first order."""
     moving = _Moving(relations, found)
     return [answer for _, group in groupby(every, key=_shape) for answer in moving.keeps(list(group))]
 

@@ -46,20 +46,20 @@ class LockedLeg(Value):
     upright: NamedVector | None = None
     eye: BodyPoint | None = None
     virtual: bool = False
-    """Whether it is that of an observation."""
+    """True if it belongs to an observation."""
     spins: bool = False
-    """Whether at special poses its end may turn about what is watched besides."""
+    """True if its end may also rotate about the observed direction at special poses."""
     held_by: tuple[str, ...] = ()
     """The labels of the observations that hold it."""
 
     @property
     def turning(self) -> NamedVector | None:
-        """What says which turns an observation leaves, None where that is all of them, and for legs."""
+        """Vector that defines the rotations that an observation allows, None if it allows all, and for legs."""
         return self.about or self.upright
 
     @property
     def free(self) -> bool:
-        """Whether the tip may move anywhere."""
+        """Return True if the tip may move anywhere."""
         return self.line is None and self.normal is None and not self.fixed
 
     @property
@@ -232,7 +232,7 @@ def _candidates(
             plane,
             CrossProduct(
                 f"e{symbol}",
-                f"direction from {eye.symbol} to the foot of its perpendicular on {foot} of {seen.leg}",
+                f"direction from {eye.symbol} to the footpoint of its perpendicular on {foot} of {seen.leg}",
                 d,
                 plane,
             ),

@@ -1,4 +1,4 @@
-"""What is rewritten: the mechanism so far, and the virtual chain of each observation in it."""
+"""State of a rewriting: the mechanism so far, and the virtual chain of each observation in it."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class VirtualChain(Value):
     roll: str | None
     taken: bool = False
     spins: bool = False
-    """Whether the takeover was of the kind that leaves the actuator's axes free."""
+    """True if the joint substitution left the actuator's axes free."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -1,4 +1,4 @@
-"""What errors in any number come to, part by part."""
+"""Ranges of errors, combined part by part."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class ErrorRange(Value):
 
     least: Annotated[float | None, SCALED] = None
     largest: Annotated[float | None, SCALED] = None
-    slack: Annotated[int, "how many are larger"] = 0
+    slack: Annotated[int, "number of larger ones"] = 0
     infinite: Recorded[int] = 0
     moves: bool = False
 
@@ -49,8 +49,8 @@ class ErrorRange(Value):
 
 @dataclass(frozen=True)
 class Tally(Value):
-    """What the first poses of a sweep came to: how many were done, how many of them are reached, the ranges, the gap,
-    and of the part with the most that are reached how many and where it starts."""
+    """Summary of the first poses of a sweep: number done, number reached, ranges, gap, and the part with the most
+    reached poses (number and start)."""
 
     done: int = 0
     reached: int = 0
@@ -72,7 +72,7 @@ class Tally(Value):
 
     @classmethod
     def parse(cls, line: str) -> Tally:
-        """What a line of the journal says."""
+        """Parse a line of the journal."""
         told = json.loads(line)
         ranges = {name: ErrorRange(**told[name]) for name in ("position", "orientation")}
         return cls(**{**told, **ranges, "fullest": tuple(told["fullest"])})

@@ -45,7 +45,7 @@ class BranchTube:
         return np.asarray(self.x + self.slopes @ (q - self.centre))
 
     def lies_in(self, other: BranchTube) -> bool:
-        """Whether all of it lies inside another tube, whose cell holds its own."""
+        """Return True if the tube lies inside another tube, whose cell contains its own."""
         off = np.abs(self.x - other.at(self.centre)) + np.abs(self.slopes - other.slopes) @ self.half + self.radius
         return bool(np.all(off < other.radius * (1 - AFFINE_ROUNDING)))
 
@@ -227,7 +227,7 @@ def drift(B: AffineForms) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class TubeDerivatives:
-    """Of k equations over tubes: the values (c, k), the derivatives by own unknowns (c, k, k), by the others of the
+    """For k equations over tubes: values (c, k), derivatives by the block's unknowns (c, k, k), by the others of the
     part (c, k, p), and along the tube by the noise symbols (c, k, n)."""
 
     values: AffineForms
@@ -319,8 +319,8 @@ def turning(trial: TubeTrial, block: LoopBlock) -> tuple[LoopEquation, ...]:
 
 
 def _same_side(trial: TubeTrial, block: LoopBlock) -> NDArray[np.bool_]:
-    """Whether (c,) both ends of a rod's loop lie on one side of its centre over the tube: two points equally far from
-    it and equal across one direction are then the same."""
+    """Mask (c,) of tubes over which both ends of a rod's loop lie on one side of its centre: two points equally far
+    from it and equal across one direction then coincide."""
     assert block.loop is not None
     system = trial.part.system
     a, _, A = rod_ends(system, block.loop, trial.part.values(trial.centre, trial.x))

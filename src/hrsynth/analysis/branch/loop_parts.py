@@ -68,7 +68,7 @@ class LoopPart(Value):
 
     @cached_property
     def place(self) -> dict[int, int]:
-        """Where an unknown stands in this part."""
+        """Return the index of an unknown in this part."""
         return {i: k for k, i in enumerate(self.unknowns)}
 
     @cached_property
@@ -159,12 +159,9 @@ def whole(
 
 
 def parts_of(system: LoopSystem) -> tuple[tuple[LoopPart, ...], tuple[int, ...]]:
-    """The parts of a system, and the coordinates that are held: those that turn nothing but themselves
-    (idle), and those of loops that no motor has to do with.
-
-    Raises ``MotorsNotEnough`` where the platform can move while all that is driven rests, ``BadRequest`` where what is
-    driven depends on each other.
-    """
+    """Return the parts of a system, and the coordinates that are constant: those that rotate only themselves
+    (internal), and those of loops without a motor. Raises ``MotorsNotEnough`` if the platform can move while all motors
+    are fixed, ``BadRequest`` if motors depend on each other."""
     held = _idle(system)
     unknowns = [i for i, each in enumerate(system.coordinates) if not each.driven and i not in held]
     parts = [_part(system, group) for group in _groups(system, unknowns)]
@@ -173,11 +170,8 @@ def parts_of(system: LoopSystem) -> tuple[tuple[LoopPart, ...], tuple[int, ...]]
 
 
 def _idle(system: LoopSystem) -> set[int]:
-    """Coordinates to hold, one for each motion at zero that leaves the platform and what is driven at rest: of each
-    the one that takes the largest part in it.
-
-    Raises ``BadRequest`` where what is driven is not independent at zero.
-    """
+    """Choose coordinates to fix, one for each motion at zero that leaves the platform and the motors fixed: of each the
+    one with the largest share. Raises ``BadRequest`` if the motors are not independent at zero."""
     held: set[int] = set()
     _, rates = whole(system, system.loops, system.gears, system.zero)
     looped = {i for loop in system.loops for i in loop.coordinates}
@@ -199,9 +193,8 @@ def _idle(system: LoopSystem) -> set[int]:
     dependent = spectrum(rates[:, every]).rank.value - spectrum(rates[:, free]).rank.value
     if dependent:
         raise BadRequest(
-            f"{system.mechanism.name}: coordinates of motors that depend on each other at the zero configuration",
-            count,
-            f"{count - dependent}: name fewer of them with --motors",
+            f"{system.mechanism.name}: only {count - dependent} of {count} motor coordinates are independent at zero",
+            remedy=f"Choose {count - dependent} with --motors.",
         )
     while free:
         kernel = spectrum(rates[:, free]).kernel
@@ -219,7 +212,7 @@ def _idle(system: LoopSystem) -> set[int]:
 
 
 def _platform_moves(system: LoopSystem, free: Sequence[int], rates: Array) -> bool:
-    """Whether the platform moves at zero with rates of some coordinates."""
+    """Return True if the platform moves at zero with rates of some coordinates."""
     by = dict(zip(free, rates, strict=True))
     spin, velocity = np.zeros(3), np.zeros(3)
     for i in system.way(system.body[system.mechanism.platform]):

@@ -29,7 +29,7 @@ def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[list[Join
 
 
 def apply(state: State, driven: list[Joint]) -> State:
-    """The same joints without motors."""
+    """Return the state without motors."""
     return replace(state, mechanism=state.mechanism.changed(joints=[replace(joint, motor=None) for joint in driven]))
 
 
