@@ -64,8 +64,8 @@ class FurtherRecord(TypedDict):
 class FurtherMeasurement(Value):
     """Candidate observation. ``kind`` is leg (its default segment), direction (of another link), line (position of a
     line whose direction is observed), encoder or offered (by the user); ``of`` names the leg, link or joint, or repeats
-    the text of ``--sensor``. An encoder has the coordinate of the joint that it reads if there are two, and tells
-    motors from passive joints."""
+    the text of ``--sensor``. An encoder has the coordinate of the joint that it reads if there are two, and its motor,
+    if any."""
 
     kind: Kind
     of: str

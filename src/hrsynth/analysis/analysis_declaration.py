@@ -91,8 +91,8 @@ def forget_answers() -> None:
 
 
 def require_kinds(kinds: Mapping[str, list[str]], options: Mapping[str, Option], given: Mapping[str, Any]) -> None:
-    """Raise ``BadRequest`` for an argument that is no number, text or truth value where the signature asks for one, or
-    a number out of its range."""
+    """Raise ``BadRequest`` for an argument that is no number, text or truth value where the signature needs one, or a
+    number out of its range."""
     for name, value in given.items():
         option = options.get(name)
         kind, *none = kinds[name]
@@ -111,7 +111,7 @@ def analysis(
     """Declare an analysis: a function of a robot with a frozen result.
 
     The robot is also accepted by its name or path, and results are cached. ``old`` option names, each with its new
-    name, are accepted for one version more. ``formations``: it also accepts several platform links. The rest is its
+    name, are accepted for one version more. ``formations``: it also accepts several platform links. All else is in its
     :class:`Declaration`: options are in the annotations of its parameters, its summary is the first paragraph of the
     docstring. The index of all analyses is made of these (:mod:`hrsynth.index`). Calls are the same with equal
     arguments and an equal robot, read from the same file.

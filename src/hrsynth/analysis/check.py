@@ -156,7 +156,7 @@ class LoopRank(NamedTuple):
 @dataclass(frozen=True, eq=False, repr=False)
 class LoopCheck(Result, shown_as="loop_check"):
     """Loop check, for a mechanism without a known platform or segment: mobility, rank of the constraints, and the
-    redundant ones; ``more`` says what a full check needs."""
+    redundant ones; ``more`` lists what a full check needs."""
 
     robot: Mechanism
     mobility: Recorded[LoopMobility]

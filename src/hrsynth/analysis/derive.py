@@ -296,9 +296,9 @@ def finish_robot(setup: ObservedRobot, state: State) -> Mechanism:
 
 
 def _as_legs(hidden: Mechanism, turns: bool) -> Mechanism:
-    """Set on a mechanism whether its platform ``turns`` if its joints do not say so, and its observations; a segment in
-    none of its legs (of a single leg the platform) becomes a direction of its link. Without a leg on the base, as in a
-    formation, it stays as it is."""
+    """Set on a mechanism whether its platform ``turns``, if its joints leave that open, and its observations; a segment
+    in none of its legs (of a single leg the platform) becomes a direction of its link. Without a leg on the base, as in
+    a formation, it stays as it is."""
     told = tuple(
         replace(o, seen_from=hidden.reference) if isinstance(o, Direction) and o.by_segment else o
         for o in hidden.observations

@@ -85,8 +85,8 @@ class Basis(Record):
 class ExactVerdict(Compared):
     """Verdict for the generic geometry of an architecture with some legs observed.
 
-    ``verdict`` and ``rank`` are None where it is not ``exact``; ``reason`` says why. ``instances`` counts the random
-    instances that carry the verdict: one where it is controllable. ``chance`` bounds that of an error where it is
+    ``verdict`` and ``rank`` are None unless it is ``exact``; ``reason`` explains it. ``instances`` counts the random
+    instances behind the verdict: one if it is controllable. ``chance`` bounds the probability of an error if it is
     ``proved`` by identities that were tested at random instances.
     """
 
@@ -290,7 +290,7 @@ class ExactArchitecture:
             together, rates = self.instance(number).ranks(places)
             _same("dim ρ of these legs", together, dimension)
             best = max(best, self.dof - together + rates)
-            if best == self.dof > 0:  # that nothing moves at one instance does not say that nothing does at others
+            if best == self.dof > 0:  # another instance may have motions where this one has none
                 return best, 1
         return best, INSTANCES
 

@@ -117,7 +117,7 @@ class Similarities(Value):
         rows = np.vstack([np.zeros((0, 3)), *(across @ (hat(each[3:6]) + each[6] * np.eye(3)) for each in S.T)])
         shifted = (across @ S[:3]).T.ravel()
         U, sizes, V = np.linalg.svd(rows, full_matrices=False)
-        told = sizes > NAMED  # of translations alone they are rounding, and tell no place
+        told = sizes > NAMED  # of translations alone they are rounding, and define no centre
         fixed = -V[told].T @ (U[:, told].T @ shifted / sizes[told])
         tied = np.linalg.norm(rows @ fixed + shifted) + np.linalg.norm(S[3:6] - axes @ (axes.T @ S[3:6]))
         if shifts.shape[1] + axes.shape[1] + scaled != S.shape[1] or tied > NAMED:

@@ -126,7 +126,7 @@ def instance(
 ) -> Instance:
     """The kinematics of a mechanism with this geometry, from the rates of its joints: whole numbers throughout.
 
-    The relations are those for the directions among the observations, and then for what the others rest on.
+    The incidences are those of the observed directions, then those of the other observations.
     """
     screws = {name: _screws(joint, relations, drawn) for name, joint in mechanism.joints.items()}
     velocities, loops, columns = _velocities(mechanism, screws)

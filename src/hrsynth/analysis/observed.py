@@ -513,7 +513,7 @@ def _observed_robot(
     observed = (*chosen, *(o for o in decomposition.mechanism.observations if o.leg in asked))
     offered = tuple(o for o in decomposition.mechanism.observations if o.leg in possible)
     known = {o.key for o in defaults.values()}
-    named = tuple(o for o in own if o.by_segment)  # of legs that are not asked for too: another set may hold them
+    named = tuple(o for o in own if o.by_segment)  # of legs that are not requested too: another set may contain them
     extra = tuple({o.key: o for o in (*observed, *offered, *named) if o.key not in known}.values())
     first, *others = normal.mechanism.bodies
     observation_model = ObservationModel(

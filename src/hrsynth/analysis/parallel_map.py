@@ -131,7 +131,7 @@ def _answer_part(function: Callable[..., Any], errors: str, part: list[Given]) -
         try:
             found.append(function(**{**given, "robot": as_robot(given["robot"])}))
         except Exception as error:
-            error.add_note("asked: " + ", ".join(f"{name} {_describe(value)}" for name, value in given.items()))
+            error.add_note("request: " + ", ".join(f"{name} {_describe(value)}" for name, value in given.items()))
             if not isinstance(error, HrsynthError):
                 raise
             found.append(error)

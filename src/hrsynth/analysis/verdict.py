@@ -77,7 +77,7 @@ class Verdict(Result, shown_as="verdict"):
     def never(self) -> str:
         """Number of dof that are unobserved at all configurations, and their names at one of them."""
         count = len(self.unobserved)
-        return f"{count} of {self.dof} dof {'is' if count == 1 else 'are'} unobserved: {self.named}"
+        return f"{count} of {self.dof} dof never observed: {self.named}"
 
     def headline(self) -> str:
         """The legs, the verdict and the rank."""

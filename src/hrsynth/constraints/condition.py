@@ -330,7 +330,7 @@ def _general(observation_model: ObservationModel) -> General:
 
 
 def always(pattern: ConstraintPattern, lost: str) -> str:
-    """Return the words for a robot with dof unobserved everywhere; ``lost`` says how many and which."""
+    """Return the words for a robot with dof unobserved everywhere; ``lost`` names them."""
     text = f"always: {lost}"
     lines = [leg for leg in pattern.legs if leg.line is not None]
     if pattern.motion == "spatial" and (names := _on_one_line(pattern.legs)):

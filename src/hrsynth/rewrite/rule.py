@@ -1,4 +1,4 @@
-"""Interface of a rule: ``find`` says where it applies and why, ``apply`` rewrites one such place.
+"""Interface of a rule: ``find`` yields the places where it applies, ``apply`` rewrites one of them.
 
 A rule does not know the order of rules or the proof. Strategies (:mod:`.strategy`) decide when it is tried, the
 equivalence check whether its result is the same robot to a camera. A rule names the side condition that fails
@@ -29,7 +29,7 @@ class Stage(Enum):
     MOTORS = "the real motors"
     LIFT = "the virtual chain of a leg, from nothing"
     DIRECTION = "the virtual actuator, by the locus of the direction"
-    ANCHOR = "the sliders under the actuator, by the locus of the anchor"
+    ANCHOR = "the sliders under the actuator, by the locus of the proximal centre"
     JOINT = "the real joint K before the observed link"
     BESIDE = "links that are joined as the observed one is"
     FORM = "the guidance of the actuator's carrier"

@@ -24,8 +24,8 @@ from ..simulation.outcome import GOAL
 @dataclass(frozen=True, eq=False, repr=False)
 class LoopEnds(Value):
     """Stable equilibria and proved attraction radius of a goal. ``others`` are the kinds of the stable equilibria that
-    were found, without the goal and those beyond joint limits (None: not searched); there may be more. ``why`` says
-    what is unknown."""
+    were found, without the goal and those beyond joint limits (None: not searched); there may be more. ``why`` is the
+    reason for what is unknown."""
 
     others: Annotated[tuple[str, ...] | None, As("kinds")]
     radius: CertifiedRadius | None

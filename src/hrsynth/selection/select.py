@@ -461,7 +461,7 @@ class _Work:
 
     def examine(self, candidates: Sequence[Candidate]) -> tuple[list[Candidate], str | None]:
         """Examine the candidates, best first: modes, aspects, equilibria, then simulated runs until enough reach the
-        goal. Also return why the rest was not examined, None if nothing was left."""
+        goal. Also return why others were not examined, None without any."""
         most, runs = self.criteria.examine, self.criteria.runs
         found: list[Candidate] = []
         arrived = begun = 0

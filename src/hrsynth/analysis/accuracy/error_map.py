@@ -67,8 +67,8 @@ class SpotChecks(Value, all_recorded=True):
 class ErrorMap(Value):
     """Error maxima over a grid, in its shape: position (m) and orientation (rad), NaN where no pose is reached,
     infinite where a platform dof is unobserved. ``smallest_at`` evaluates the smallest singular value of Mᵀ (n,) at
-    other poses of the grid (values of its axes (n, ndim)); None for poses solved one by one. ``dependent`` says that
-    parts of these poses depend on each other, if some are not reached."""
+    other poses of the grid (values of its axes (n, ndim)); None for poses solved one by one.
+    ``dependent`` states that parts of these poses depend on each other, if some are not reached."""
 
     grid: Annotated[Grid, FLAT]
     reached: Annotated[Flags, Table]

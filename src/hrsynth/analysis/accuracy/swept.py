@@ -68,18 +68,19 @@ class SweptErrors(Value):
 
 
 def sweep_to(path: str | Path, mapper: Mapper, grid: Grid, seed: int) -> SweptErrors:
-    """Write the error maxima over a grid to ``path``, whole or not at all, and go on where the same sweep was broken
-    off; memory is that of one part.
+    """Write the error maxima over a grid to ``path``, whole or not at all, and continue an interrupted sweep.
+
+    The memory is that of one part.
 
     Raises
     ------
     BadRequest
-        For another ending than .npy, poses that are found one by one, a disk that is too small, another sweep to that
-        file: at work, or broken off.
+        For another suffix than .npy, poses that are solved one by one, a disk that is too small, or another sweep to
+        that file, running or interrupted.
     BuildStopped
-        Where the disk takes no more; what was written is kept.
+        If the disk is full; what was written is kept.
     NoReachablePose
-        Where no pose of the grid is reached.
+        If no pose of the grid is reached.
     """
     name, target = mapper.setup.robot.name, require_file(path)
     if mapper.batch is None:
@@ -137,8 +138,7 @@ def require_file(path: str | Path) -> Path:
 
 class _SweepDraft:
     """Array of a grid that is being written, and its journal: the request, then a line per part. Both are on the disk
-    when a part counts as done; a truncated last line is cut off, and a damaged one, found by its checksum, does not
-    count."""
+    when a part counts as done; a truncated last line is cut off, and a damaged one (by its checksum) does not count."""
 
     def __init__(self, target: Path, grid: Grid, asked: str, compiled: bool) -> None:
         self.target = target

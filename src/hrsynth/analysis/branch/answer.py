@@ -17,7 +17,7 @@ from .loops import LoopSystem
 
 KEPT, PASSED, OPEN, UNSEEN = "kept", "passed", "undecided", "not examined"
 """Verdict on a joint limit over the cells."""
-BACK = "low and high of a box of motor values with an inverse map: different values, different poses (proved)"
+BACK = "low and high of a box of all motors: no two motor positions in it give the same pose on the branch (proved)"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -56,7 +56,7 @@ class BranchCell(Value, all_recorded=True):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Toggle(Value, all_recorded=True):
-    """End of the proof, found in floating point: motors ``q`` (n,) of a part at which the ``joints`` can move,
+    """End of the proof, in floating point: motors ``q`` (n,) of a part at which the ``joints`` can move,
     numerically, while all motors are fixed (a determinant vanishes); ``loops`` are those that they close. Without
     joints: no such configuration was found, and the proof was given up for its ``reason``."""
 
@@ -197,9 +197,9 @@ class BranchProof(Result, shown_as="branch"):
     def limits_in_words(self) -> list[str]:
         """Results for the limits of joints without a motor."""
         says = {
-            KEPT: "kept in all proved cells (proved)",
-            PASSED: "passed in the proved cells",
-            OPEN: "not proved to be kept",
+            KEPT: "satisfied in all proved cells (proved)",
+            PASSED: "exceeded in the proved cells",
+            OPEN: "not proved to be satisfied",
             UNSEEN: "not examined (S joints, and joints at which loops are cut)",
         }
         told = {verdict: [each.words for each in self.limits if each.verdict == verdict] for verdict in says}

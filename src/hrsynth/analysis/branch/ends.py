@@ -1,4 +1,4 @@
-"""Ends of the proof of a branch: toggles, found in floating point, and full turns that do or do not close."""
+"""Ends of the proof of a branch: toggles (in floating point), and full turns that do or do not close."""
 
 from __future__ import annotations
 

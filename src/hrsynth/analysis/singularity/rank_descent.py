@@ -1,4 +1,4 @@
-"""Descent to a pose at which the relation loses rank, whatever the condition says."""
+"""Descent to a pose at which the relation loses rank, independent of the condition."""
 
 from __future__ import annotations
 

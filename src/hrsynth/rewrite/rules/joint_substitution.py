@@ -59,12 +59,12 @@ def substitution(
         return
     found = Substitution(chain, None, proximal.turning_axis)
     if K.type is not JointType.REVOLUTE and evidence.can_spin(chain.link, chain.direction):
-        yield Match(found, f"{chain.link!r} can rotate about its direction while all other links are fixed")
+        yield Match(found, f"{chain.link!r} can rotate about its own direction while all other links are fixed")
     else:
         yield Match(
             found,
             "applied without its side condition",
-            unmet=f"{chain.link!r} cannot rotate about its direction, and {K.name!r} is not an R or a U "
+            unmet=f"{chain.link!r} cannot rotate about its own direction, and {K.name!r} is not an R or a U "
             "whose axes the actuator could take",
         )
 

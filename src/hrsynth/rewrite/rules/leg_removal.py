@@ -56,5 +56,5 @@ RULE = Rule(
     find,
     apply,
     whole_leg,
-    keeps=("the wrenches of removed legs are among those of the rest",),
+    keeps=("the wrenches of removed legs are among those of the others",),
 )
