@@ -141,7 +141,7 @@ def test_legs_with_skew_axes_keep_their_joint(legs: int, pods: int, seed: int, w
     result = simplified(setup)
     is_right(setup, result.state.mechanism)
     assert word in result.state.architecture().ascii.split("+")
-    refused = [s for s in result.steps if s.rule == "takeover" and not s.accepted and int(s.leg or 0) <= legs]
+    refused = [s for s in result.steps if s.rule == "joint substitution" and not s.accepted and int(s.leg or 0) <= legs]
     assert len(refused) == legs
     for number in range(1, legs + 1):
         assert f"elbow_{number}" in result.state.mechanism.joints
@@ -215,7 +215,7 @@ def test_trust_in_arms_that_turn_the_parallelogram_is_caught(seed: int) -> None:
     is_wrong(setup, trusted[0].state.mechanism)
     result = simplified(setup)
     is_right(setup, result.state.mechanism)
-    refused = [step for step in result.steps if step.rule == "companion" and not step.accepted]
+    refused = [step for step in result.steps if step.rule == "rod transfer" and not step.accepted]
     assert {step.leg for step in refused} == {"1", "2", "3"}
     assert all("changes its direction" in step.reason for step in refused)
     assert result.state.architecture().ascii != "3-Pi-{2-U*S}"

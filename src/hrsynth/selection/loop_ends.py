@@ -63,7 +63,9 @@ class LoopEnds(Value):
         """Number of other stable equilibria, by kind."""
         if self.others is None:
             return "not searched"
-        kinds = ", ".join(f"{count} {kind}" for kind, count in Counter(self.others).items())
+        kinds = ", ".join(
+            f"{count} {'nonzero error' if kind == CRITICAL else kind}" for kind, count in Counter(self.others).items()
+        )
         return kinds or "none"
 
     attracting = Shown(int | None, lambda self: None if self.others is None else len(self.others))
