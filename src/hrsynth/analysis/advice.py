@@ -184,8 +184,24 @@ class SensorSuggestion(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Advice(Result, shown_as="advise"):
-    """Suggestions of further observations. ``now`` is the present verdict; ``sets`` are all cheapest sets of the best
-    attainable rank (the smallest ones if all costs are equal), empty if nothing is missing or nothing helps."""
+    """Suggestions of further observations.
+
+    Parameters
+    ----------
+    setup
+        Robot with observations and samples.
+    now
+        Present verdict.
+    sets
+        All cheapest sets of the best attainable rank (the smallest ones if all costs are equal); empty if nothing is
+        missing or nothing helps.
+    tried
+        Number of sets that were tried.
+    complete
+        True if every set of this size and of all smaller ones was tried, and none was left undecided.
+    undecided
+        Number of sets without a clear rank gap at the samples.
+    """
 
     setup: Annotated[ObservedRobot, FLAT]
     now: Verdict

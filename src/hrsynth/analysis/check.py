@@ -87,8 +87,21 @@ class Unreached(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Check(Result, shown_as="check"):
-    """Results of a check: observations, configurations at the requested poses, and the loop constraints that are
-    redundant at generic ones."""
+    """Results of a check at poses.
+
+    Parameters
+    ----------
+    setup
+        Robot with observations and samples.
+    postures
+        Report on the configuration at each requested pose.
+    redundant
+        Loop constraints that are redundant at generic configurations.
+    grid
+        Results over a grid, if requested.
+    unreached
+        Requested poses that the robot does not reach.
+    """
 
     setup: Annotated[ObservedRobot, FLAT]
     postures: Annotated[tuple[ConfigurationReport, ...], As("configurations")]
@@ -155,8 +168,21 @@ class LoopRank(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LoopCheck(Result, shown_as="loop_check"):
-    """Loop check, for a mechanism without a known platform or segment: mobility, rank of the constraints, and the
-    redundant ones; ``more`` lists what a full check needs."""
+    """Loop check, for a mechanism without a known platform or segment.
+
+    Parameters
+    ----------
+    robot
+        Mechanism as read.
+    mobility
+        Mobility of its links and joints.
+    constraints
+        Rank of the loop constraints, with its margins.
+    redundant
+        Redundant constraints by loop.
+    more
+        What a full check needs.
+    """
 
     robot: Mechanism
     mobility: Recorded[LoopMobility]

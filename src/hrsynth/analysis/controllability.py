@@ -52,7 +52,25 @@ class LegSet(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Legs(Result, shown_as="legs"):
-    """The verdict of every set of observed legs, and the smallest sets of the best rank."""
+    """Verdict of every set of observed legs, and the smallest sets of the best rank.
+
+    Parameters
+    ----------
+    setup
+        Robot with observations and samples.
+    robot, architecture, dof
+        Name, architecture notation and platform dof.
+    sets
+        Verdict of each set.
+    exact
+        Verdict of each set for generic geometry of the same architecture.
+    complete
+        True if all sets are listed.
+    minimal, minimal_complete
+        Smallest sets of the best rank; True if these are all of them.
+    where
+        Request that replaced the zero configuration.
+    """
 
     setup: ObservedRobot
     robot: Recorded[str]

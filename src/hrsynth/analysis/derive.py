@@ -82,8 +82,31 @@ class Notation(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Derivation(Result, shown_as="derive"):
-    """Derivation of a hidden robot (None if every leg is a constant-direction leg): robot, observations, steps,
-    equivalence check and verdict."""
+    """Derivation of a hidden robot.
+
+    Parameters
+    ----------
+    robot
+        Robot as read.
+    setup
+        Robot with observations and samples.
+    form
+        ``simplified`` or ``general``.
+    architecture, hidden_architecture
+        Architecture notation of the robot and of the hidden robot.
+    hidden
+        Hidden robot as a mechanism (m, rad, base coordinates), None if every leg is a constant-direction leg.
+    verdict
+        Controllability at generic configurations.
+    exact
+        Verdict for generic geometry of the same architecture.
+    taken
+        All steps; those of the observed legs were compared with the real robot all together.
+    equivalence
+        Equivalence check of the hidden robot at all samples.
+    unchecked
+        Unchecked form, None if it was not requested.
+    """
 
     robot: Mechanism
     setup: Annotated[ObservedRobot, FLAT]

@@ -99,9 +99,26 @@ class OtherMode(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ObservedRobot(Value):
-    """Robot with observations: the mechanism, its normal form and legs, the observations, and samples.
+    """Robot with observations; made by :func:`hrsynth.observe`, accepted by every analysis.
 
-    Made by :func:`hrsynth.observe` and accepted by every analysis. Poses are in base coordinates (m, rad).
+    Parameters
+    ----------
+    robot
+        Mechanism as read.
+    normal
+        Its normal form.
+    decomposition
+        Its legs and platform.
+    observed
+        Observations.
+    all_samples
+        Samples with all default segments, the observations, and the segments that the file names.
+    defaults
+        Number of default segments among the observations of ``all_samples``; they come first.
+    form
+        Format of printed poses.
+    offered
+        Candidate observations, also among those of ``all_samples``.
     """
 
     robot: Mechanism

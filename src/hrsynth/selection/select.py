@@ -198,8 +198,23 @@ class Unexamined(TypedDict):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Selection(Result, shown_as="select"):
-    """Sets of legs up to a size, ranked for one displacement: the kept ones, then those not examined (most accurate
-    first), then the discarded ones."""
+    """Sets of legs up to a size, ranked for one displacement.
+
+    Parameters
+    ----------
+    setup
+        Robot with observations and samples.
+    start, goal
+        Poses (m, rad, base coordinates).
+    candidates
+        Sets: the kept ones by rank, those not examined (most accurate first), the discarded ones.
+    bounds
+        Measurement bounds of the observations.
+    visible_from
+        Camera, None without one.
+    left
+        Reason why sets were not examined, None if all were.
+    """
 
     setup: Annotated[ObservedRobot, As(flat=True, without=("observed",))]
     start: Recorded[Pose]

@@ -48,8 +48,23 @@ class SampledErrors(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Accuracy(Result, shown_as="accuracy"):
-    """Error maxima for cones about the observed directions and noise of other observations, at single poses or over a
-    grid; sampled nonlinear errors if requested."""
+    """Error maxima at poses or over a grid, for given measurement bounds.
+
+    Parameters
+    ----------
+    setup
+        Robot with observations and samples.
+    bounds
+        Measurement bounds of the observations.
+    poses
+        Errors at single poses (m, rad).
+    sampled
+        Nonlinear check of each pose, None if it was not requested.
+    field
+        Errors over a grid, None without one.
+    swept
+        File to which a grid was written, None without one.
+    """
 
     setup: Annotated[ObservedRobot, FLAT]
     bounds: MeasurementBounds

@@ -151,10 +151,34 @@ class MotorBeyond(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BranchProof(Result, shown_as="branch"):
-    """Branch of the zero configuration: q ↦ x from motors to passive coordinates, part by part. ``system`` has the
-    coordinates (name, axis, point, parent: the tree in order) and the loop equations; its lengths are in units of
-    ``system.length`` m, those of the parts in m. ``held`` are the coordinates of internal motions, which are constant.
-    All coordinates count from the zero of the file."""
+    """Proved branch of the zero configuration: q ↦ x from motors to passive coordinates, part by part.
+
+    All coordinates count from the zero of the file.
+
+    Parameters
+    ----------
+    robot
+        Mechanism as read.
+    system
+        Coordinates (name, axis, point, parent: the tree in order) and loop equations, in units of ``system.length`` m.
+    motors, passive
+        Names of the motor coordinates and of the passive coordinates that follow from them.
+    fixed
+        Names of the coordinates of internal motions, which are constant.
+    parts
+        Parts of the loops with their cells (m, rad).
+    injective_box
+        Box of all motors (m, rad), low and high (n,) each, in which no two motor positions give the same pose (proved);
+        None without a proof.
+    regular
+        True if the proved box is proved to contain no Type 1 singularity.
+    box
+        Origin of the box: the limits of the file, the caller, a default.
+    tried
+        Number of cells that were tried.
+    limits
+        Limits of the joints without a motor.
+    """
 
     robot: Mechanism
     system: LoopSystem

@@ -68,7 +68,29 @@ class Unchecked(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Singularity(Result, shown_as="singularities"):
-    """Type 2 condition of a robot with respect to its measured values: the observations, or its motors."""
+    """Type 2 condition of a robot with respect to its measured values.
+
+    Parameters
+    ----------
+    setup
+        Robot with observations and samples.
+    observation_model
+        Map from configurations to measured values and their rates.
+    real
+        True for the real robot: the measured values are its motor coordinates.
+    verdict
+        Controllability at generic configurations.
+    pattern
+        Constraints of the locked legs on the platform.
+    condition
+        Condition in words and as an expression, None if a dof is unobserved everywhere.
+    words
+        Condition, or ``always`` with the unobserved dof.
+    checked
+        Comparison of words, expression and rank, None if a dof is unobserved everywhere.
+    examples
+        Singular poses constructed from the condition.
+    """
 
     setup: ObservedRobot
     observation_model: ObservationModel
