@@ -434,7 +434,7 @@ def test_no_set_that_sees_as_much_is_cheaper(cost: str) -> None:
 @pytest.mark.parametrize(
     ("cost", "said"),
     [
-        ("thing=2", "kind of measurement"),
+        ("thing=2", "kind of observation"),
         ("point=0", "a positive number"),
         ("point=1,point=2", "given twice"),
         ("point", "a positive number"),

@@ -356,7 +356,7 @@ def test_another_dof() -> None:
 def test_gears_are_said_to_be_left_out() -> None:
     generic = architecture(setting_of("3rrr_m1"))
     geared = replace(generic.mechanism, couplings=(Coupling("gear", "prox_1", "prox_2", 2.0),))
-    check_refused(ExactArchitecture(geared, generic.relations, generic.observations, generic.relation), "gears")
+    check_refused(ExactArchitecture(geared, generic.relations, generic.observations, generic.relation), "couplings")
 
 
 def test_relations_that_leave_no_direction() -> None:

@@ -126,7 +126,7 @@ GIVEN: dict[str, dict[str, object]] = {
 @pytest.mark.parametrize("command", sorted(analyses().keys() - {"check", "view"}))
 def test_every_other_question_asks_for_the_platform(command: str):
     for robot in (opened("3rrr_m1"), load(tree(2, 2))):
-        with pytest.raises(NoPlatform, match="expected --platform LINK"):
+        with pytest.raises(NoPlatform, match="--platform LINK"):
             getattr(hrsynth, command)(robot, **GIVEN.get(command, {}))
     assert isinstance(hrsynth.check(opened("3rrr_m1")), LoopCheck)
 

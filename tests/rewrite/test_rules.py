@@ -125,7 +125,7 @@ def test_takeover_of_a_skew_elbow_is_caught(legs: int, pods: int, seed: int) -> 
     state, evidence = lifted(setup), evidence_of(setup)
     offered, refused = proposals(joint_substitution.RULE.proposals(state, evidence, "1"))
     assert offered == []
-    assert "cannot turn about its own direction" in refused[0].reason
+    assert "cannot rotate about its own direction" in refused[0].reason
     forced, _ = proposals(joint_substitution.RULE.proposals(state, evidence, "1", waive=True))
     is_wrong(setup, forced[0].state.mechanism)
     is_right(setup, state.mechanism)

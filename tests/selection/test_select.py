@@ -296,7 +296,7 @@ def test_a_blind_camera_discards_every_set() -> None:
     ("options", "word"),
     [
         ({"cone": "90deg"}, "half-angle"),
-        ({"cone": "1=0.1deg"}, "no cone"),
+        ({"cone": "1=0.1deg"}, "no angle for leg 2"),
         ({"size": 0}, "size: got 0"),
         ({"runs": -1}, "runs"),
         ({"visible_from": "x=0"}, "camera"),

@@ -176,7 +176,7 @@ class ExactArchitecture:
         if chance:
             reason += f", except for a chance below {power_above(chance)}"
         if basis.sampled:
-            reason += f"  of geometry with {len(basis.sampled)} sampled incidences ({basis.sampled[0]})"
+            reason += f" of geometry with {len(basis.sampled)} sampled incidences ({basis.sampled[0]})"
         reason += basis.nearly
         said = word(seen, self.dof) if trivial is None else formation_word(self.dof - seen - trivial)
         return ExactVerdict(legs, said, seen, self.dof, True, instances, reason, proved, chance, basis, trivial)

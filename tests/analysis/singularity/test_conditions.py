@@ -247,7 +247,7 @@ def test_as_many_freedoms_are_lost_everywhere_but_not_the_named_ones(robot: str,
     """At configurations of another walk: what is named is lost at the zero configuration, where the words put it."""
     answer = found(robot, legs)
     count, named = len(answer.verdict.unobserved), np.column_stack([each.twist for each in answer.verdict.unobserved])
-    assert answer.words.startswith(f"always: {count} of {answer.verdict.dof} freedoms")
+    assert answer.words.startswith(f"always: {count} of {answer.verdict.dof} dof never observed: ")
     assert "(at the zero configuration)" in answer.words
     start, scale = answer.setup.all_samples.start, np.repeat([1 / answer.setup.mechanism.length, 1.0], 3)[:, None]
     seen = []

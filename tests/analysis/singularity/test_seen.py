@@ -111,7 +111,7 @@ def test_points_on_one_line() -> None:
     [
         (
             LINES,
-            "the images of the lines meet in a point, or C and the feet of its perpendiculars on the lines",
+            "the images of the lines meet in a point, or C and the footpoints of its perpendiculars on the lines",
             "det(e1, e2, e3)*det(n1, n2, n3)",
         ),
         pytest.param(
