@@ -158,7 +158,7 @@ def _joints_behind(setup: ObservedRobot, joint: Joint, number: int) -> list[str]
 PROBES = 3
 """Configurations at which all sets are tried; what sees most there is verified at all samples."""
 LARGEST_SIZE = 4
-"""Measurements of the largest sets that are tried."""
+"""Number of observations in the largest sets that are tried."""
 LARGEST_COUNT = 20000
 """Sets of one size that are tried."""
 LARGEST_VALUE = 6
@@ -169,7 +169,7 @@ BATCH = 2000
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SensorSuggestion(Value):
-    """A set of measurements, and the verdict with them at all samples."""
+    """Suggested set of observations, with its verdict at all samples."""
 
     measurements: Recorded[tuple[FurtherMeasurement, ...]]
     verdict: Verdict
@@ -231,11 +231,11 @@ class Advice(Result, shown_as="advise"):
     @property
     @recorded()
     def size(self) -> int:
-        """Measurements of the smallest set."""
+        """Number of observations in the smallest set."""
         return min((len(each.measurements) for each in self.sets), default=0)
 
     def headline(self) -> str:
-        """The robot, its verdict and how many sets of how many measurements help."""
+        """Robot, verdict, and number of suggested sets."""
         found = "nothing is missing" if self.nothing_missing else f"{len(self.sets)} sets of {self.size} more"
         return f"{self.setup.headline()}: {self.now.verdict}, {found}"
 

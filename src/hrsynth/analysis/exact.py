@@ -62,9 +62,9 @@ class Basis(Record):
     loop_invariant: Recorded[int]
     sampled: Recorded[tuple[str, ...]]
     largest_defect_held: Annotated[float, As("largest_defect_held")] = 0.0
-    """The largest defect (sines, characteristic lengths) of a relation that counts as held."""
+    """Largest defect (sines, characteristic lengths) of an incidence that counts."""
     smallest_defect_not_held: Annotated[float | None, As("smallest_defect_not_held")] = None
-    """The smallest one of a relation that nearly holds and does not count."""
+    """Smallest defect of an incidence that does not count."""
 
     @property
     def nearly(self) -> str:
@@ -128,7 +128,7 @@ class ExactArchitecture:
         self.start = relation.mobility if start is None else start
         self.dof = relation.dof.value
         self.obstacle = "couplings are not part of exact geometry" if mechanism.couplings else relations.doubt
-        """Why there are no instances; empty as long as there are."""
+        """Reason why there are no instances; empty if there are."""
         self._places = {o.key: i for i, o in enumerate(self.observations)}
         self._instances: list[Instance] = []
         self._answers: dict[tuple[tuple[str, ...], ...], ExactVerdict] = {}

@@ -187,8 +187,8 @@ def _translations(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Con
 
 
 def _apart(pattern: ConstraintPattern) -> str | None:
-    """Why held legs leave no translation x in common at any pose, None where this is not known: x would have to lie
-    along each line that is constant, and be normal to each constant axis about which a tip turns and to each constant
+    """Reason why locked legs allow no common translation x at any pose, None if this is not known: x would have to lie
+    along each line that is constant, and be normal to each constant axis about which a tip rotates and to each constant
     normal of a tip's plane; no x does where these rows have rank 3."""
     rows, reasons = [], []
     for leg in pattern.legs:
@@ -345,7 +345,7 @@ def always(pattern: ConstraintPattern, lost: str) -> str:
 
 
 def _on_one_line(legs: Sequence[LockedLeg]) -> str:
-    """The tips where these, two at least, are on one line in one link, and nothing else is held; else empty."""
+    """Tips, if these (two at least) are on one line in one link, and nothing else is locked; else empty."""
     if len(legs) < 2 or len({leg.tip.link for leg in legs}) > 1 or any(leg.turning is not None for leg in legs):
         return ""
     arms = np.array([leg.tip.place - legs[0].tip.place for leg in legs[1:]])

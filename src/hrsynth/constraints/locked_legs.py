@@ -1,4 +1,4 @@
-"""Legs with their measurements held, and the virtual legs of held observations: what they leave the platform.
+"""Locked legs, and the virtual legs of locked observations: the motions that they allow the platform.
 
 An observation of the platform holds its link by wrenches alone: forces at a point B leave B a line, a plane, a point or
 all of space, and moments leave turns about one axis, about all normals of one, or all (docs/pages/observations.md).
@@ -28,7 +28,7 @@ Place = tuple[str, tuple[float, ...]]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LockedLeg(Value):
-    """A leg with its measurements held, or the virtual leg of an observation of the platform.
+    """Locked leg, or the virtual leg of an observation of the platform.
 
     Its end ``tip`` on ``body`` may move along ``line``, or in the plane with this ``normal``, or not at all where
     ``fixed``; ``turns`` is the number of independent rotations about axes through the tip: of an observation those

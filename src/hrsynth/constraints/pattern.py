@@ -1,4 +1,4 @@
-"""The pattern of a robot's wrench systems with its measurements held, recognised over samples, never at one pose.
+"""Pattern of the wrench systems of a robot with locked legs, recognised over samples, never at one pose.
 
 With what is measured held, leg i lets its end translate along V_i and turn about axes through a point B_i; what the
 whole platform can still do must be in all of them (theory.md 7). This module finds V_i, B_i and their names.
@@ -133,7 +133,7 @@ def recognise(
     everywhere: bool = True,
 ) -> ConstraintPattern:
     """The pattern at the samples; ``motion`` is ``other`` where it is none of the known ones, or, unless it need not
-    hold ``everywhere``, where a held leg may leave its end more at special poses."""
+    hold ``everywhere``, where a locked leg may allow its end more at special poses."""
     other = ConstraintPattern("other", decomposition.mechanism.base, leg_ends(decomposition))
     base, bodies = decomposition.mechanism.base, leg_ends(decomposition)
     motions = _motions(decomposition, observation_model, samples)
@@ -332,7 +332,7 @@ def _two_bodies(
 def _motions(
     decomposition: LegDecomposition, observation_model: ObservationModel, samples: Sequence[ClosedConfiguration]
 ) -> Array:
-    """Bases (n, 6 bodies, d) of what the platform's bodies can do with nothing held; they differ in number where the
+    """Bases (n, 6 bodies, d) of the motions of the platform links with nothing locked; they differ in number where the
     samples are not alike, then the largest are kept."""
     asked = replace(observation_model, bodies=leg_ends(decomposition), observations=())
     found = [relation(at, asked).basis[asked.twist_rows :] for at in samples]
@@ -395,7 +395,7 @@ def _locked_leg(
     everywhere: bool,
     translating: bool,
 ) -> LockedLeg | None:
-    """The leg's pattern with these observations held, alike at all samples (``everywhere``: all poses), or None."""
+    """Pattern of the leg with these observations locked, alike at all samples (``everywhere``: all poses), or None."""
     try:
         systems = leg_twists_together(samples, leg, locks, reference)
     except ValueError:

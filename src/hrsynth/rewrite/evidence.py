@@ -58,7 +58,7 @@ class ProximalChain:
     rotations: Array
     """Orientations of ``before`` seen from the reference link, relative to the zero configuration, (n, 3, 3)."""
     anchors: Array
-    """Positions of A, (n, 3), in base coordinates with the reference link held."""
+    """Positions of A, (n, 3), in base coordinates with the reference link fixed."""
     length: float
 
     @cached_property
@@ -103,7 +103,7 @@ class Evidence:
         self._proximal: dict[str, ProximalChain | None] = {}
 
     def directions(self, index: int) -> Array:
-        """All sampled values of observation ``index``, (n, 3), in base coordinates with the reference link held."""
+        """All sampled values of observation ``index``, (n, 3), in base coordinates with the reference link fixed."""
         home = self.mechanism.links[self.reference].pose[:3, :3]
         values = [target.measured[index][1] for member in self.samples.members for target in member.way]
         return np.asarray(values) @ home.T

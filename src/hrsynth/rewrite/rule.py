@@ -52,7 +52,7 @@ class Match(Generic[Found]):
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why a rule does not apply."""
+    """Reason why a rule does not apply."""
 
     reason: str
 
@@ -91,7 +91,7 @@ class Rule(Generic[Place, Found]):
     apply: Callable[[State, Found], State]
     places: Callable[[State, str], Sequence[Place]]
     otherwise: str | None = None
-    """Why it is refused where nothing is found at any place of a leg."""
+    """Reason of the refusal if nothing is found at any place of a leg."""
     always: bool = False
     """True if the rule holds for every robot: then it must be accepted."""
     keeps: tuple[str, ...] = ()

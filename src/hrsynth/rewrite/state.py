@@ -147,7 +147,7 @@ class State(Value):
 
 
 def _relink(mechanism: Mechanism, chain: ObservationChain, known: set[str]) -> Mechanism:
-    """With the ends of a chain that lie on no known link moved to the base."""
+    """Return the state with the ends of a chain that lie on no known link moved to the base."""
     ends = [(chain.joints[0], chain.reference), (chain.joints[-1], chain.link)]
     joints = {name: mechanism.joints[name].relinked(link, mechanism.base) for name, link in ends if link not in known}
     return mechanism.changed(joints=joints.values()) if joints else mechanism

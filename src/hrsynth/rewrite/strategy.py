@@ -136,7 +136,7 @@ Strategy = Callable[[Rewriting], Rewriting]
 
 
 def chain(*strategies: Strategy) -> Strategy:
-    """One strategy after the other."""
+    """Run one strategy after the other."""
 
     def run(at: Rewriting) -> Rewriting:
         for strategy in strategies:
@@ -229,7 +229,7 @@ GENERAL = chain(LIFTED, each_leg(observed_legs, Stage.DIRECTION, Stage.ANCHOR, S
 """The general form: sliders under every virtual actuator, all legs kept."""
 
 DROPPED = each_leg(unobserved_legs, Stage.LEG)
-"""All unobserved legs tried, whether they can go."""
+"""Removal of unobserved legs, each tried."""
 
 SIMPLIFIED = chain(
     GENERAL,

@@ -125,7 +125,7 @@ def test_a_full_disk_is_told_and_nothing_is_lost(tmp_path: Path, monkeypatch: py
     target = tmp_path / "s.npy"
     with monkeypatch.context() as patched:
         patched.setattr(swept.shutil, "disk_usage", lambda _: type("Usage", (), {"free": 1000}))
-        with pytest.raises(BadRequest, match="size of the file in bytes: got [0-9]+, expected at most"):
+        with pytest.raises(BadRequest, match=r"size of the file in bytes: got [0-9]+, expected at most"):
             swept_to(target, 50, monkeypatch)
     broken_off(target, monkeypatch)
 

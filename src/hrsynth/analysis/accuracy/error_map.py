@@ -33,7 +33,7 @@ Flags = NDArray[np.bool_]
 PART = 25_000
 """Poses, at least, that are evaluated between two signs of progress."""
 SPOTS = 10
-"""Poses of a grid at which the batch is held against Pinocchio."""
+"""Number of poses of a grid at which the batch is compared with Pinocchio."""
 FINE, COARSE = 201, 41
 """Poses a side of a plane by the batch, and one by one."""
 
@@ -251,7 +251,7 @@ class Mapper(Value):
     def spots(
         self, grid: Grid, seen: ErrorField, seed: int, count: int = SPOTS, cells: NDArray[np.int64] | None = None
     ) -> SpotChecks:
-        """Hold the batch against Pinocchio at random poses of those that are ``seen``, all of a grid or those at some
+        """Compare the batch with Pinocchio at random poses of those that are ``seen``, all of a grid or those at some
         ``cells``; raises ``Disagreement``."""
         sizes = [np.where(np.isfinite(each), each, 0.0) for each in (seen.position, seen.orientation)]
         limits = [USUAL_ERROR * np.median(each[each > 0]) if (each > 0).any() else np.inf for each in sizes]

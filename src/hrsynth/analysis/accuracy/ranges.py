@@ -60,7 +60,7 @@ class Tally(Value):
     fullest: tuple[int, int] = (0, 0)
 
     def with_part(self, count: int, reached: int, position: ErrorRange, orientation: ErrorRange, gap: float) -> Tally:
-        """With one part more."""
+        """Return the summary with one part more."""
         return Tally(
             self.done + count,
             self.reached + reached,

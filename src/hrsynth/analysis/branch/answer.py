@@ -108,13 +108,13 @@ class BranchPart(Value):
     toggles: Recorded[tuple[Toggle, ...]]
     turns: tuple[tuple[str, bool], ...]
     closed_to: Annotated[float, "residual bound of the redundant equations (characteristic lengths, radians)"]
-    """Bound of the equations that were left out, over all tubes; 0 where they are proved to hold."""
+    """Bound of the redundant equations, over all tubes; 0 if they are proved to hold."""
     redundant: Recorded[str]
-    """Why the equations that were left out hold; empty where none was."""
+    """Reason why the redundant equations hold; empty without any."""
 
     @property
     def in_cells(self) -> str:
-        """Its number of cells in words."""
+        """Number of cells in words."""
         return f"{len(self.cells)} cell" + "s" * (len(self.cells) != 1)
 
     @property

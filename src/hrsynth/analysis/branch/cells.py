@@ -64,7 +64,7 @@ class TubeTrial:
     alive: NDArray[np.bool_]
 
     def kept(self, which: Any) -> TubeTrial:
-        """Some of the cells."""
+        """Return some of the cells."""
         return TubeTrial(
             self.part,
             *(
@@ -79,7 +79,7 @@ class TubeTrial:
         return len(self.part.driven), len(self.part.driven) + len(self.part.bent)
 
     def forms(self, radius: Array) -> list[AffineForms | None]:
-        """All coordinates over the tubes; None for those that are held."""
+        """Coordinates over the tubes; None for those that are constant."""
         n, count = self.symbols
         found: list[AffineForms | None] = [None] * len(self.part.system.coordinates)
         spread = np.zeros((*self.x.shape, count))
@@ -239,7 +239,7 @@ class TubeDerivatives:
 def evaluate_equations(
     part: LoopPart, equations: Sequence[LoopEquation], forms: Sequence[AffineForms | None]
 ) -> tuple[list[Any], list[dict[int, Any]]]:
-    """The values of equations, and their derivatives by the coordinates that are not held."""
+    """Values of equations, and their derivatives by the coordinates that are not constant."""
     values: list[Any] = [0.0] * len(equations)
     slopes: list[dict[int, Any]] = [{} for _ in equations]
     groups: dict[int, list[int]] = {}

@@ -59,7 +59,7 @@ class GrownCell:
 
     @property
     def volume(self) -> float:
-        """Its part of the box."""
+        """Fraction of the box."""
         return float(np.prod((self.high - self.low) / 2.0**FINEST_BRANCH_CELL))
 
 

@@ -24,8 +24,8 @@ NEWTON_STEPS = 30
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LoopEquation(Value):
-    """An equation of a part: a row of a loop, or a gear (``row`` is None); ``swings``: one of the equations that turn
-    a joint which was left out to the place where the loop closes."""
+    """Equation of a part: a row of a loop, or a coupling (``row`` is None); ``swings``: one of the equations that
+    rotate a joint which was left out to where the loop closes."""
 
     of: JointLoop | CouplingEquation
     row: LoopRow | None = None
@@ -80,7 +80,7 @@ class LoopPart(Value):
         )
 
     def values(self, q: Array, x: Array) -> list[Array | None]:
-        """All coordinates, held ones None, for those that drive this part (…, n) and its unknowns (…, p)."""
+        """Coordinates, constant ones None, for those that drive this part (…, n) and its unknowns (…, p)."""
         found: list[Array | None] = [None] * len(self.system.coordinates)
         for places, given in ((self.driven, q), (self.unknowns, x)):
             for k, i in enumerate(places):
@@ -138,7 +138,7 @@ def whole(
     values: Any,
     shape: tuple[int, ...] = (),
 ) -> tuple[Array, Array]:
-    """All equations of loops and gears (…, m) and their derivatives by all coordinates (…, m, N), at values of a
+    """Equations of loops and couplings (…, m) and their derivatives by all coordinates (…, m, N), at values of a
     ``shape``, None for those at zero."""
     count = sum(len(loop.rows) for loop in loops) + len(gears)
     errors, rates = np.zeros((*shape, count)), np.zeros((*shape, count, len(values)))
@@ -228,7 +228,7 @@ def _platform_moves(system: LoopSystem, free: Sequence[int], rates: Array) -> bo
 def _groups(
     system: LoopSystem, unknowns: Sequence[int]
 ) -> list[tuple[list[int], list[JointLoop], list[CouplingEquation]]]:
-    """Unknowns that equations connect, with those loops and gears."""
+    """Unknowns that equations connect, with those loops and couplings."""
     home = {i: {i} for i in unknowns}
     every: list[JointLoop | CouplingEquation] = [*system.loops, *system.gears]
     for each in every:
@@ -279,8 +279,8 @@ def _part(system: LoopSystem, group: tuple[list[int], list[JointLoop], list[Coup
 
 
 def _as_cut(loop: JointLoop, unknowns: Sequence[int]) -> JointLoop:
-    """A loop with all its equations where the joint that was left out cannot turn its rod everywhere: a held coordinate
-    of it is no spin."""
+    """Return a loop with all its equations if the joint that was left out cannot rotate its rod everywhere: a constant
+    coordinate of it is no spin."""
     if loop.swung is None:
         return loop
     turning = sum(i in unknowns for i in loop.chains[1][loop.swung : loop.swung + loop.swings])

@@ -102,8 +102,8 @@ class CouplingEquation(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LoopSystem(Value):
-    """The coordinates of a mechanism's spanning tree, parents first, the loops between them and the gears;
-    ``body[link]`` is the coordinate that carries a link, −1 for what stands still; ``length`` the unit (m)."""
+    """Coordinates of a mechanism's spanning tree, parents first, the loops between them and the couplings;
+    ``body[link]`` is the coordinate that carries a link, −1 for fixed links; ``length`` the unit (m)."""
 
     mechanism: Mechanism
     length: float

@@ -1,4 +1,4 @@
-"""Why equations of loops that were left out hold: by the group that a loop's links move in, or to what bound."""
+"""Redundant loop equations: proof that they hold, by the group in which a loop's links move, or a bound."""
 
 from __future__ import annotations
 

@@ -98,7 +98,7 @@ class Singularity(Result, shown_as="singularities"):
     verdict: Verdict
     pattern: ConstraintPattern
     condition: Condition | None
-    """None if a dof is unobserved everywhere."""
+    """Condition, None if a dof is unobserved everywhere."""
     words: Recorded[str]
     checked: Agreement | None
     examples: Recorded[tuple[Example, ...]]

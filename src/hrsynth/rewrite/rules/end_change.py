@@ -47,7 +47,7 @@ class LegEnds:
 
 
 def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[list[LegEnds]] | Refusal]:
-    """All observed legs at once: a match for each direction of the outer axis."""
+    """Yield all observed legs at once: a match for each direction of the outer axis."""
     found = [ends for chain in state.chains if chain.taken and (ends := _ends(state, evidence, chain)) is not None]
     if not found:
         yield Refusal("no observed leg ends in an S whose rod the actuator moves")

@@ -40,7 +40,7 @@ class LiftedChain:
 
 
 def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[list[LiftedChain | Encoder]]]:
-    """One match for each leg: a chain for each of its observations."""
+    """Yield one match for each leg: a chain for each of its observations."""
     found: list[LiftedChain | Encoder] = []
     for index, observation in enumerate(evidence.samples.observation_model.observations):
         if observation.leg != leg:
