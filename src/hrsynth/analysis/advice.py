@@ -47,9 +47,9 @@ Kind = Literal["leg", "direction", "line", "encoder", "offered"]
 
 
 class FurtherRecord(TypedDict):
-    """A measurement that could be added. An encoder has `actuated`, and as its `axis` the word for the coordinate that
-    it reads (null if there is only one); others have the `link`, and a point `at` (m) and an `axis` in its frame (null
-    if there are none)."""
+    """Candidate observation. An encoder has `actuated`, and as its `axis` the name of the coordinate that it reads
+    (null if there is only one); others have the `link`, and a point `at` (m) and an `axis` in its frame (null if there
+    are none)."""
 
     kind: Kind
     of: Annotated[str, "leg, link, joint, or text of --sensor"]

@@ -89,7 +89,8 @@ def following(found: Iterable[Sensed], twists: Mapping[str, Numbers]) -> tuple[N
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Flex(Value, all_recorded=True):
-    """Flex: ``count`` independent motions of some links while all others are fixed and no measured value changes."""
+    """Flex, a motion of some links while all others are fixed and no measured value changes. It has ``count``
+    independent motions."""
 
     links: tuple[str, ...]
     count: int

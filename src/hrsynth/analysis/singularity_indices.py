@@ -100,8 +100,8 @@ def interaction_matrix(found: VelocityRelation) -> Array | None:
 
 @dataclass(frozen=True)
 class Redundancy(Record, all_recorded=True):
-    """Redundant constraints: ``rows`` equations of the loop ``loop`` that depend on those of earlier loops; at generic
-    configurations if ``generic``."""
+    """Redundant equations of a loop, which depend on those of earlier loops. There are ``rows`` of the loop ``loop``,
+    at generic configurations if ``generic``."""
 
     loop: str
     rows: int

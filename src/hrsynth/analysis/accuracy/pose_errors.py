@@ -49,14 +49,14 @@ class ErrorEllipsoid(Value):
     least: Annotated[float, Number, SCALED]
     least_direction: Annotated[Array | None, list[float] | None]
     errors: Array | None
-    gap: Annotated[float, "overestimate at most, relative to the attained error"] = 0.0
+    gap: Annotated[float, "largest possible overestimate, relative to the attained error"] = 0.0
     single: bool = False
     """True if there are errors in one direction only."""
 
     @property
     @recorded()
     def anisotropy(self) -> float | None:
-        """The largest error as multiple of the least; None where there is one direction only, or no finite error."""
+        """Ratio of the largest to the least error; None for one direction only, or no finite error."""
         if self.direction is None or self.single or not np.isfinite(self.largest):
             return None
         return self.largest / self.least

@@ -15,8 +15,8 @@ from ...results import Value
 
 @dataclass(frozen=True)
 class ErrorRange(Value):
-    """Errors in any number: the least and the largest of those that the first order bounds (None: there are none), how
-    many are larger, how many infinite, and whether any is not zero."""
+    """Range of errors: the least and the largest of those that the first order bounds (None: there are none), the
+    numbers of larger and of infinite ones, and whether any is not zero."""
 
     least: Annotated[float | None, SCALED] = None
     largest: Annotated[float | None, SCALED] = None

@@ -62,7 +62,7 @@ class SweptErrors(Value):
     @property
     @recorded(As("swept"))
     def counts(self) -> SweptCounts:
-        """Content of the file."""
+        """File to which the errors are written."""
         tally = self.tally
         return SweptCounts(self.grid.size, tally.reached, self.before, tally.position, tally.orientation)
 

@@ -15,7 +15,7 @@ from ...records import As, Number, Recorded, Shown, Table, recorded
 from ...results import Result, Value
 from .loops import LoopSystem
 
-KEPT, PASSED, OPEN, UNSEEN = "kept", "passed", "undecided", "not examined"
+KEPT, PASSED, OPEN, UNSEEN = "kept", "passed", "undecided", "not looked at"
 """Verdict on a joint limit over the cells."""
 BACK = "low and high of a box of all motors: no two motor positions in it give the same pose on the branch (proved)"
 
@@ -77,7 +77,7 @@ class BranchLimit(Value, all_recorded=True):
     upper: float | None
     least: Annotated[float | None, "null if its loop is cut there"]
     most: float | None
-    verdict: Annotated[str, Literal["kept", "passed", "undecided", "not examined"], "kept and passed are proved"]
+    verdict: Annotated[str, Literal["kept", "passed", "undecided", "not looked at"], "kept and passed are proved"]
 
     @property
     def words(self) -> str:

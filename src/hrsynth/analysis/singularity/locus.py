@@ -40,10 +40,10 @@ STEPS = 51
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SingularityMap(Value):
-    """A robot over a plane: the expression's value, the smallest singular value (Type 2 where zero) and the inverse of
-    the largest (Type 1 where zero), each (nx, ny), NaN where no pose is reached; where the expression has no sign,
-    ``spots`` are singular poses (k, 2) that were found, and ``curve`` pieces (k, 2, 2) of the curve that was; ``never``
-    where the condition cannot vanish, ``everywhere`` where it applies to all poses."""
+    """Singularity map of a robot over a plane. It has the expression's value, the smallest singular value (Type 2 where
+    zero) and the inverse of the largest (Type 1 where zero), each (nx, ny), NaN where no pose is reached; if the
+    expression has no sign, ``spots`` are singular poses (k, 2) that were found, and ``curve`` pieces (k, 2, 2) of the
+    curve; ``never`` if the condition cannot vanish, ``everywhere`` if it applies to all poses."""
 
     value: Annotated[Array, list[list[Number]], As("expression"), "null: not reached"]
     signed: bool
