@@ -409,7 +409,7 @@ def rank_of(robot: str, watched: list[str], sensor: list[str]) -> int:
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize("price", ["leg=0.9,point=0.7,direction=9,encoder=9,line=9", "point=1.5,encoder=4,leg=2", ""])
+@pytest.mark.parametrize("cost", ["leg=0.9,point=0.7,direction=9,encoder=9,line=9", "point=1.5,encoder=4,leg=2", ""])
 def test_no_set_that_sees_as_much_is_cheaper(cost: str) -> None:
     """Told sets see all and cost the same; of legs and points each cheaper set, asked by itself, sees less."""
     places = ["0.1,0,0", "-0.1,0.1,0", "0,-0.1,0.1"]
@@ -432,9 +432,9 @@ def test_no_set_that_sees_as_much_is_cheaper(cost: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("price", "said"),
+    ("cost", "said"),
     [
-        ("thing=2", "kind of measurement"),
+        ("thing=2", "kind of observation"),
         ("point=0", "a positive number"),
         ("point=1,point=2", "given twice"),
         ("point", "a positive number"),

@@ -354,6 +354,6 @@ def test_the_singular_pose_really_moves() -> None:
 
 def test_a_set_that_never_shows_all_is_not_called_regular_alone():
     found = hrsynth.check("delta", ["1"])
-    assert repr(found).endswith("regular, shows 2 of 3>")
+    assert repr(found).endswith("regular, observes 2 of 3 dof>")
     assert "the directions show 2 of 3: as many as at generic poses, not singular" in hrsynth.text(found)
     assert repr(hrsynth.check("delta")).endswith("regular>")

@@ -356,7 +356,7 @@ def test_another_dof() -> None:
 def test_gears_are_said_to_be_left_out() -> None:
     generic = architecture(setting_of("3rrr_m1"))
     geared = replace(generic.mechanism, couplings=(Coupling("gear", "prox_1", "prox_2", 2.0),))
-    check_refused(ExactArchitecture(geared, generic.relations, generic.observations, generic.relation), "gears")
+    check_refused(ExactArchitecture(geared, generic.relations, generic.observations, generic.relation), "couplings")
 
 
 def test_relations_that_leave_no_direction() -> None:
@@ -442,8 +442,8 @@ def test_the_architecture_in_a_derivation(robot: str, observe: None, verdict: st
     record = found.to_dict()["architecture"]
     assert record.pop("chance") == (pytest.approx(8e-17, rel=0.2) if "chance" in words else 0)
     basis = record.pop("relations")
-    assert (basis["kept"] > 0) == (robot in ("quattro_rigid", "uranesx"))
-    assert basis["observed"] == []
+    assert (basis["loop_invariant"] > 0) == (robot in ("quattro_rigid", "uranesx"))
+    assert basis["sampled"] == []
     assert record == {
         "verdict": verdict,
         "exact": True,

@@ -103,7 +103,7 @@ def test_what_holds_at_zero_by_accident_is_not_kept(robot: str) -> None:
     assert not verdict.proved
     assert "proved" not in verdict.reason
     if verdict.exact:
-        assert "observed at samples" in verdict.reason
+        assert "sampled incidences" in verdict.reason
 
 
 @pytest.mark.parametrize("seed", [0, 1])
@@ -157,7 +157,7 @@ def test_a_special_zero_configuration_proves_nothing_of_what_loops_keep() -> Non
     )
     verdict = other.verdict(other.observations)
     assert (verdict.exact, verdict.proved, verdict.verdict) == (True, False, CONTROLLABLE)
-    assert "relations observed at samples" in verdict.reason
+    assert "sampled incidences" in verdict.reason
     planar = architecture(setting_of("3rrr_m1"))
     other = ExactArchitecture(planar.mechanism, planar.relations, planar.observations, planar.relation, 9)
     assert other.verdict(other.observations).proved
@@ -265,10 +265,10 @@ def test_rails_that_are_nearly_parallel(angle: float) -> None:
     verdict = architecture(setup).verdict(setup.observed)
     assert {member.relation.rank for member in setup.all_samples.members} == {verdict.rank}
     assert verdict.verdict == (PARTIAL if angle < 1e-7 else CONTROLLABLE)
-    told = "count as held" if angle < 1e-7 else "does not count"
+    told = "defect up to" if angle < 1e-7 else "does not count"
     assert (told in verdict.reason) == (angle > 1e-10)
     if told in verdict.reason:
-        assert 0.5 * angle < float(re.findall(r"by (?:up to )?(\S+)", verdict.reason)[0]) <= angle
+        assert 0.5 * angle < float(re.findall(r"defect (?:up to|of) (\S+)", verdict.reason)[0]) <= angle
 
 
 def test_no_verdict_where_held_and_missed_are_close() -> None:

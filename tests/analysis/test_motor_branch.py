@@ -253,7 +253,7 @@ def test_tubes_hold_what_small_steps_find(name, half):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("name", "least", "effort"), [("quattro", 0.009, 100), ("hexa", 0.004, 100)])
+@pytest.mark.parametrize(("name", "least", "max_cells"), [("quattro", 0.009, 100), ("hexa", 0.004, 100)])
 def test_a_box_much_too_large_is_proved_about_zero(name, least, max_cells):
     """Whole turns of four and six motors: cells no larger than the one about zero that is proved, most of which are."""
     proof = branch(name, max_cells=max_cells)
@@ -294,7 +294,7 @@ def test_a_lattice_fills_the_box_about_its_start(data, n, most):
 
 
 def test_motors_that_do_not_make_a_function_are_refused():
-    with pytest.raises(BadRequest, match="depend on each other"):
+    with pytest.raises(BadRequest, match="motor coordinates are independent at zero"):
         branch("quattro_rigid")
     robot = load("rrrrr_m1")
     idle = Mechanism.of(
@@ -344,7 +344,7 @@ def test_limits_that_limit_nothing_are_a_whole_turn():
         joints=[replace(joint, limits=Limits(-1e9, 1e9)) for joint in robot.joints.values() if joint.actuated]
     )
     found = branch(wide, max_cells=2)
-    assert found.box == "a whole turn"
+    assert found.box == "a full turn"
     assert np.array(found.parts[0].requested_box).ravel() == pytest.approx([-np.pi, np.pi])
 
 

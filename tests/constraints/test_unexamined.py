@@ -54,7 +54,7 @@ def rows(robot: Mechanism, oracle: Oracle, state: Array, seen: tuple[Direction, 
 @pytest.mark.slow
 def test_a_3_upu_loses_a_turn_where_its_two_watched_directions_are_not_parallel() -> None:
     answer = found("3upu", "1,2")
-    assert answer.words == "the watched directions u1, u2 are parallel"
+    assert answer.words == "the observed directions u1, u2 are parallel"
     posture = check("3upu", "1,2", at=LOST).postures[0]
     robot, there = answer.setup.mechanism, posture.configuration
     oracle, state = Oracle(robot), np.array([there.pose(link) for link in robot.links])

@@ -103,7 +103,7 @@ def obeys(setup: ObservedRobot, form: str = "simplified", thorough: bool = False
     assert all(
         "refused, " in step.reason
         for step in result.steps
-        if not step.accepted and step.largest_angle is not None and "taken back" not in step.reason
+        if not step.accepted and step.largest_angle is not None and "discarded" not in step.reason
     )
     assert len(recorder.passed) >= sum(step.largest_angle is not None for step in accepted)
     return result

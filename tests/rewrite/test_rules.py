@@ -125,7 +125,7 @@ def test_takeover_of_a_skew_elbow_is_caught(legs: int, pods: int, seed: int) -> 
     state, evidence = lifted(setup), evidence_of(setup)
     offered, refused = proposals(joint_substitution.RULE.proposals(state, evidence, "1"))
     assert offered == []
-    assert "cannot turn about its own direction" in refused[0].reason
+    assert "cannot rotate about its own direction" in refused[0].reason
     forced, _ = proposals(joint_substitution.RULE.proposals(state, evidence, "1", waive=True))
     is_wrong(setup, forced[0].state.mechanism)
     is_right(setup, state.mechanism)
@@ -141,7 +141,7 @@ def test_legs_with_skew_axes_keep_their_joint(legs: int, pods: int, seed: int, w
     result = simplified(setup)
     is_right(setup, result.state.mechanism)
     assert word in result.state.architecture().ascii.split("+")
-    refused = [s for s in result.steps if s.rule == "takeover" and not s.accepted and int(s.leg or 0) <= legs]
+    refused = [s for s in result.steps if s.rule == "joint substitution" and not s.accepted and int(s.leg or 0) <= legs]
     assert len(refused) == legs
     for number in range(1, legs + 1):
         assert f"elbow_{number}" in result.state.mechanism.joints
@@ -215,7 +215,7 @@ def test_trust_in_arms_that_turn_the_parallelogram_is_caught(seed: int) -> None:
     is_wrong(setup, trusted[0].state.mechanism)
     result = simplified(setup)
     is_right(setup, result.state.mechanism)
-    refused = [step for step in result.steps if step.rule == "companion" and not step.accepted]
+    refused = [step for step in result.steps if step.rule == "rod transfer" and not step.accepted]
     assert {step.leg for step in refused} == {"1", "2", "3"}
     assert all("changes its direction" in step.reason for step in refused)
     assert result.state.architecture().ascii != "3-Pi-{2-U*S}"

@@ -694,7 +694,7 @@ KINDS: dict[str, tuple[str, Callable[[np.random.Generator], Case]]] = {
     "removed leg along the first axis of its U": ("leg removal", partial(pod, kind="removed")),
     "the rest lets the platform turn": ("leg removal", partial(delta, observe=ALL[:2], kind="released")),
     "platform can turn": ("end change", partial(delta, observe=ALL[:2], kind="couples")),
-    "own parallelogram flat, ΠRR": ("anchor locus", partial(planar, observe=ALL, kind="flat_loop", first="ΠRR")),
+    "own parallelogram flat, ΠRR": ("centre locus", partial(planar, observe=ALL, kind="flat_loop", first="ΠRR")),
     "own parallelogram flat, ΠPR": ("direction locus", partial(planar, observe=ALL, kind="flat_loop", first="ΠPR")),
     "u in the plane of K's axes": ("prismatic merge", upu),
     "u along e₁": ("lift", partial(pod, kind="pole")),

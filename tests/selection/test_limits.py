@@ -60,7 +60,7 @@ def test_poses_beyond_limits_are_named(limited: Path):
 def test_ends_beyond_limits_discard_all_sets(limited: Path, x: float):
     start, goal = "x=0,y=0,phi=0", f"x={x},y=0,phi=0"
     for name, ends in {"goal": (start, goal), "start": (goal, start)}.items():
-        found = hrsynth.select(limited, start=ends[0], goal=ends[1], runs=0, endings=0)
+        found = hrsynth.select(limited, start=ends[0], goal=ends[1], runs=0, equilibria=0)
         reason = f"the {name} is beyond the limits of shoulder_1"
         told = [each.discarded for each in found.candidates if each.legs == ("1", "2", "3")]
         assert told == [reason if abs(crank(x)) > LIMIT else None]

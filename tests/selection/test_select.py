@@ -190,12 +190,11 @@ def test_why_fewer_legs_are_better() -> None:
     assert fewer_are_better(best, [(("1", "2", "3"), ends((), 0.02)), (("1", "3", "4"), ends(("mode",), 0.0))]) is None
     worse = [(("1", "2", "3"), ends(("mode",), 0.03)), (("1", "2", "3", "4"), ends(("critical", "critical"), 0.03))]
     assert fewer_are_better(best, worse) == (
-        "fewer legs are better here: with 1, 2 the loop was found to be drawn to no other pose besides the goal, with "
-        "1, 2, 3, 4 to 2 critical; the errors of more directions than there are freedoms can balance where they do not "
-        "vanish"
+        "fewer legs are better here: with 1, 2 the stable equilibria found besides the goal are: none; with 1, 2, "
+        "3, 4: 2 nonzero error; with redundant observation, nonzero errors can balance"
     )
     assert fewer_are_better(best, [(("1", "2", "3"), ends(None, 0.0))]) is None
-    assert "the certified radius is 30 mm, with 1, 2, 3 it is 4 mm" in str(
+    assert "the proved attraction radius is 30 mm, with 1, 2, 3 it is 4 mm" in str(
         fewer_are_better(best, [(("1", "2", "3"), ends((), 0.004))])
     )
 
@@ -212,8 +211,8 @@ def test_four_legs_are_worse_than_two_where_runs_show_it() -> None:
         shares.append(sum(end.share for end in runs.ends if end.run_outcome.name == "goal"))
     assert shares[0] > 1.5 * shares[1] > 0
     said = str(fewer_are_better(found[0], found[1:]))
-    assert said.startswith("fewer legs are better here: with 2, 3 the loop was found to be drawn to ")
-    assert said.endswith("the errors of more directions than there are freedoms can balance where they do not vanish")
+    assert said.startswith("fewer legs are better here: with 2, 3 the stable equilibria found besides the goal are: ")
+    assert said.endswith("with redundant observation, nonzero errors can balance")
 
 
 @pytest.mark.slow
@@ -297,12 +296,12 @@ def test_a_blind_camera_discards_every_set() -> None:
     ("options", "word"),
     [
         ({"cone": "90deg"}, "half-angle"),
-        ({"cone": "1=0.1deg"}, "no cone"),
-        ({"size": 0}, "size, found 0"),
+        ({"cone": "1=0.1deg"}, "no angle for leg 2"),
+        ({"size": 0}, "size: got 0"),
         ({"runs": -1}, "runs"),
         ({"visible_from": "x=0"}, "camera"),
         ({"visible_from": "x=0,y=0,z=0,rpy=0/0/0", "focal": 0.0}, "focal"),
-        ({"examine": 0}, "examine, found 0"),
+        ({"examine": 0}, "examine: got 0"),
         ({"start": "w=1"}, "unknown part"),
     ],
 )

@@ -1,1 +1,1 @@
-"""One module a question: what is controllable, which hidden robot a controller moves, which legs must be watched."""
+"""One module per analysis: controllability, hidden robot, legs to observe and so on."""

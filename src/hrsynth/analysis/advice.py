@@ -1,4 +1,4 @@
-"""What is missing: the smallest sets of further measurements that make a robot controllable, of all candidates."""
+"""Suggestions: the cheapest sets of further observations that make a robot controllable."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ Kind = Literal["leg", "direction", "line", "encoder", "offered"]
 
 
 class FurtherRecord(TypedDict):
-    """A measurement that could be added. An encoder has `actuated`, and as its `axis` the word for the coordinate that
-    it reads (null if there is only one); others have the `link`, and a point `at` (m) and an `axis` in its frame (null
-    if there are none)."""
+    """Candidate observation. An encoder has `actuated`, and as its `axis` the name of the coordinate that it reads
+    (null if there is only one); others have the `link`, and a point `at` (m) and an `axis` in its frame (null if there
+    are none)."""
 
     kind: Kind
-    of: Annotated[str, "the leg, the link, the joint, or the words of --sensor"]
+    of: Annotated[str, "leg, link, joint, or text of --sensor"]
     leg: Annotated[str | None, "null: of a joint or a link inside the platform"]
     link: NotRequired[str]
     at: NotRequired[list[float] | None]
@@ -62,12 +62,10 @@ class FurtherRecord(TypedDict):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FurtherMeasurement(Value):
-    """A measurement that could be added.
-
-    ``kind`` is leg (its default segment), direction (of another link), line (the position of a line whose direction is
-    observed), encoder or offered (by the user); ``of`` names the leg, the link or the joint, or repeats the words of
-    ``--sensor`` for what is offered. An encoder says which coordinate of the joint it reads if there are two, and
-    whether a motor drives the joint."""
+    """Candidate observation. ``kind`` is leg (its default segment), direction (of another link), line (position of a
+    line whose direction is observed), encoder or offered (by the user); ``of`` names the leg, link or joint, or repeats
+    the text of ``--sensor``. An encoder has the coordinate of the joint that it reads if there are two, and its motor,
+    if any."""
 
     kind: Kind
     of: str
@@ -93,8 +91,8 @@ class FurtherMeasurement(Value):
 
 
 def candidates(setup: ObservedRobot, offered: Sequence[str] = ()) -> tuple[FurtherMeasurement, ...]:
-    """Everything that could be added: legs, directions of other links, positions of observed lines, encoders, and what
-    is ``offered``, in the words of ``--sensor``."""
+    """Return all candidates: legs, directions of other links, positions of observed lines, encoders, and those of
+    ``offered``, in the form of ``--sensor``."""
     more = [
         FurtherMeasurement("offered", text, each, each.leg) for text, each in zip(offered, setup.offered, strict=True)
     ]
@@ -160,7 +158,7 @@ def _joints_behind(setup: ObservedRobot, joint: Joint, number: int) -> list[str]
 PROBES = 3
 """Configurations at which all sets are tried; what sees most there is verified at all samples."""
 LARGEST_SIZE = 4
-"""Measurements of the largest sets that are tried."""
+"""Number of observations in the largest sets that are tried."""
 LARGEST_COUNT = 20000
 """Sets of one size that are tried."""
 LARGEST_VALUE = 6
@@ -171,12 +169,12 @@ BATCH = 2000
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SensorSuggestion(Value):
-    """A set of measurements, and the verdict with them at all samples."""
+    """Suggested set of observations, with its verdict at all samples."""
 
     measurements: Recorded[tuple[FurtherMeasurement, ...]]
     verdict: Verdict
     cost: Recorded[float]
-    """Of all of them together; each is 1 where nothing else is said."""
+    """Total cost of the set; 1 for each observation without a given cost."""
 
     verdict_record = Shown(Word, lambda self: self.verdict.verdict, As("verdict"))
     rank = Shown(int, lambda self: self.verdict.rank)
@@ -186,15 +184,31 @@ class SensorSuggestion(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Advice(Result, shown_as="advise"):
-    """What is missing. ``now`` is the present verdict; ``sets`` are all the cheapest sets of the best rank that can be
-    reached (the smallest ones if all prices are equal), empty if nothing is missing or nothing helps."""
+    """Suggestions of further observations.
+
+    Parameters
+    ----------
+    setup
+        Robot with observations and samples.
+    now
+        Present verdict.
+    sets
+        All cheapest sets of the best attainable rank (the smallest ones if all costs are equal); empty if nothing is
+        missing or nothing helps.
+    tried
+        Number of sets that were tried.
+    complete
+        True if every set of this size and of all smaller ones was tried, and none was left undecided.
+    undecided
+        Number of sets without a clear rank gap at the samples.
+    """
 
     setup: Annotated[ObservedRobot, FLAT]
     now: Verdict
     sets: Recorded[tuple[SensorSuggestion, ...]]
     tried: Recorded[int]
     complete: Recorded[bool]
-    """Whether every set of this size and of all smaller ones was tried, and none was left undecided."""
+    """True if every set of this size and of all smaller ones was tried, and none was left undecided."""
     undecided: Recorded[int] = 0
     """Sets that were promising at the probes, but whose rank has no clear gap at the samples."""
 
@@ -206,22 +220,22 @@ class Advice(Result, shown_as="advise"):
     @property
     @recorded()
     def nothing_missing(self) -> bool:
-        """Whether the robot is controllable as it is, or has nothing to control."""
+        """True if the robot is controllable as it is, or has nothing to control."""
         return self.now.verdict in (CONTROLLABLE, AT_REST)
 
     @property
     def cured(self) -> bool:
-        """Whether the sets make the robot controllable."""
+        """True if the sets make the robot controllable."""
         return bool(self.sets) and self.sets[0].verdict.verdict == CONTROLLABLE
 
     @property
     @recorded()
     def size(self) -> int:
-        """Measurements of the smallest set."""
+        """Number of observations in the smallest set."""
         return min((len(each.measurements) for each in self.sets), default=0)
 
     def headline(self) -> str:
-        """The robot, its verdict and how many sets of how many measurements help."""
+        """Robot, verdict, and number of suggested sets."""
         found = "nothing is missing" if self.nothing_missing else f"{len(self.sets)} sets of {self.size} more"
         return f"{self.setup.headline()}: {self.now.verdict}, {found}"
 
@@ -250,8 +264,8 @@ def advise(
     candidate_sensor: Annotated[
         SeeLike,
         option(
-            "What could be observed in addition, written as for --sensor; without a place, such as "
-            "point:plate, several places of that link; separate more by commas, or repeat.",
+            "What could be observed in addition, as for --sensor; without a point, such as "
+            "point:plate, several points of that link; separate more by commas, or repeat.",
             "[CAMERA=]KIND:LINK[@x,y,z/dx,dy,dz/radius]",
             kind=list[str],
             group=OBSERVATION,
@@ -260,29 +274,56 @@ def advise(
     cost: Annotated[
         str,
         option(
-            "Prices by kind, such as encoder=0.5,point=3 (default: 1 each); the cheapest sets are "
-            "sought. Kinds: leg, direction, line, encoder and what is offered.",
+            "Costs by kind, such as encoder=0.5,point=3 (default: 1 each); the cheapest sets are "
+            "searched. Kinds: leg, direction, line, encoder and those of --candidate-sensor.",
             "KIND=NUMBER",
         ),
     ] = "",
     most: int | None = None,
     seed: Seed = 0,
 ) -> Advice:
-    """What is missing: the smallest sets of further measurements that make a robot controllable.
+    """Smallest sets of further observations that make a robot controllable.
 
-    The cheapest sets of further measurements with which u̇ = 0 forces t = 0 (theory.md 6; MMT 5.3): the smallest,
-    unless ``cost``, as ``encoder=0.5,point=3``, says what one measurement of a kind costs (default: 1).
+    Parameters
+    ----------
+    robot
+        Mechanism, observed robot, path of a file, name of a shipped robot, or ``example:NAME``.
+    observe
+        Leg labels or link names; default: what the file observes, else all legs.
+    camera
+        Link that carries the camera (default: the base), or named cameras ``NAME=LINK@x,y,z/r,p,y`` (m, rad).
+    sensor
+        Other observations, ``[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius`` (m, link frame).
+    candidate_sensor
+        Further candidates, texts as for ``sensor``; without a point, ``point:plate``, several points of that link.
+    cost
+        Cost of one observation of a kind, such as ``encoder=0.5,point=3`` (default: 1).
+    most
+        Largest number of sets that are verified (default: all).
+    seed
+        Seed of the random configurations.
 
-    ``observe`` holds leg labels or link names (default: what the robot observes, else all legs), ``camera`` the link
-    that carries the camera.
-    Candidates are the default segment of a further leg, the direction of any other link of a leg, the position of a
-    line whose direction is observed, an encoder on any joint, and what is offered (``candidate_sensor``: texts as for
-    ``sensor``; one without a place, ``point:plate``, stands for several places of that link). Every returned set is
-    verified at all samples; at most ``most`` of the smallest are. Raises ``BadRequest`` for unknown names,
-    ``RankUndecided`` if what is seen now has no clear rank.
+    Returns
+    -------
+    Advice
+        Cheapest sets with which u̇ = 0 implies t = 0, each verified at all samples.
 
+    Raises
+    ------
+    BadRequest
+        For unknown names.
+    RankUndecided
+        If the present rank has no clear gap.
+
+    Notes
+    -----
+    Candidates: the default segment of a further leg, the direction of any other link of a leg, the position of a line
+    whose direction is observed, an encoder on any joint, and ``candidate_sensor`` (theory.md 6; MMT 5.3).
+
+    Examples
+    --------
     >>> hrsynth.advise("3rrr_m1", "1,2")
-    <Advice: 3rrr_m1, watching 1, 2: partially controllable, 15 sets of 1 more>
+    <Advice: 3rrr_m1, observing 1, 2: partially controllable, 15 sets of 1 more>
     """
     robot = as_robot(robot)
     length = (robot if isinstance(robot, Mechanism) else robot.robot).length
@@ -312,33 +353,33 @@ def advise(
 
 
 def _kind(measurement: FurtherMeasurement) -> str:
-    """The word by which a price is given."""
+    """Return the kind by which a cost is given."""
     return measurement.observation.kind if measurement.kind == "offered" else measurement.kind
 
 
 def _prices(text: str) -> dict[str, float]:
-    """What one measurement of each kind costs; raises ``BadRequest``."""
+    """Return the cost of one observation of each kind; raises ``BadRequest``."""
     allowed = sorted({"leg", "direction", "line", "encoder", *kinds()})
     found: dict[str, float] = {}
     for part in filter(None, text.split(",")):
         kind, _, number = part.partition("=")
         if kind not in allowed:
-            raise BadRequest("--cost: kind of measurement", kind, ", ".join(allowed))
+            raise BadRequest("--cost: kind of observation", kind, ", ".join(allowed))
         if kind in found:
-            raise BadRequest("--cost: a kind given twice", text, f"one price of {kind}")
+            raise BadRequest(f"--cost {text}: {kind} is given twice", remedy="Omit one.")
         try:
             found[kind] = plain_number(number)
         except ValueError:
             found[kind] = np.nan
         if not 0 < found[kind] < np.inf:
-            raise BadRequest(f"--cost of {kind}", number, "a positive number, as point=3")
+            raise BadRequest(f"--cost of {kind}", number, "a positive number")
     return found
 
 
 def _verify(
     setup: ObservedRobot, samples: Samples, sets: Sequence[tuple[tuple[FurtherMeasurement, ...], float]]
 ) -> list[SensorSuggestion]:
-    """Each set with its price and its verdict at all samples; those whose rank has no clear gap are left out."""
+    """Return each set with its cost and its verdict at all samples; sets whose rank has no clear gap are left out."""
     found = list[SensorSuggestion]()
     for added, cost in sets:
         watched = (*setup.observed, *(each.observation for each in added))
@@ -351,7 +392,7 @@ def _verify(
 
 
 class Search:
-    """The sets of candidates, tried on what is not seen yet.
+    """Sets of candidates, tested on the unobserved twists.
 
     At each probe, N is a basis of the part of ρ in which no observed value moves. A set of rows C of N sees t there iff
     ker C ⊂ ker T, T the twist's rows: what stays lost has dimension rank [C; T] − rank C.
@@ -379,7 +420,8 @@ class Search:
         ]
 
     def count_lost(self, sets: Sequence[Sequence[int]]) -> Array:
-        """How many freedoms stay lost with each set, generically: the least over the probes; shape (sets,)."""
+        """Return the number of dof that stay unobserved with each set, generically: the least over the probes; shape
+        (sets,)."""
         places = np.array(sets, dtype=int)
         found = []
         for rows, twist in zip(self._rows, self._twists, strict=True):
@@ -389,8 +431,8 @@ class Search:
         return np.min(found, axis=0)
 
     def cheapest(self, costs: Sequence[float]) -> tuple[list[tuple[int, ...]], bool]:
-        """All cheapest sets that lose as little as all candidates together, and whether all sets that could cost less
-        were tried; within the budget the best there are. ``costs`` of single candidates are positive."""
+        """Return all cheapest sets of the rank of all candidates together, and True if all sets that could cost less
+        were tried; within the limit the best there are. ``costs`` of single candidates are positive."""
         count, prices = len(self.useful), np.array(costs)
         if not count:
             return [], True
@@ -423,7 +465,7 @@ class Search:
 def _without_twins(
     kept: Sequence[int], all_samples: Sequence[FurtherMeasurement], rates: Sequence[Sequence[Array]]
 ) -> list[int]:
-    """Leave out a link's direction whose rates tell what a direction before it does (links joined by P joints only)."""
+    """Leave out a link's direction whose rates equal those of one before it (links joined by P joints only)."""
     spans = {
         i: [range_basis(blocks[i].T, 1.0)[0] for blocks in rates]
         for i in kept

@@ -1,4 +1,4 @@
-"""What all questions share: robots by value, name or path; old names of options; answers that are remembered."""
+"""Declaration of analyses: robots by value, name or path; options; cached results."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ KINDS: dict[str, tuple[Any, str]] = {
     "str": (str, "a text"),
     "bool": ((bool, np.bool_), "True or False"),
 }
-"""What an argument must be whose type is one of these, and in words."""
+"""Check and name of the arguments of each type."""
 
 
 @dataclass(frozen=True)
 class Declaration:
-    """What is said once of an analysis: its ``place`` in lists, what it answers in one line, its options, examples of
-    its command line, whether it takes a ``seed`` there."""
+    """Declaration of an analysis: its ``place`` in lists, its summary, its options, examples of its command line, and
+    its ``seed``."""
 
     place: int
     help: str
@@ -47,14 +47,15 @@ class Declaration:
 
 
 class AnswerMemory:
-    """The answers that were asked for last, at most so many."""
+    """Results of the latest calls, up to a number."""
 
     def __init__(self, most: int) -> None:
         self.most, self.lock = most, Lock()
         self.kept: OrderedDict[Hashable, Any] = OrderedDict()
 
     def answer(self, key: Hashable, ask: Callable[[], Any]) -> Any:
-        """What was answered before, or is now; not kept where an optional package was missing, which may come."""
+        """Return the cached result, or compute it; not kept if an optional package was missing, which may be installed
+        later."""
         with self.lock:
             if key in self.kept:
                 self.kept.move_to_end(key)
@@ -73,8 +74,10 @@ _ANSWERS, _GRIDS = AnswerMemory(REMEMBERED_ANSWERS), AnswerMemory(REMEMBERED_GRI
 
 
 def clear_cache() -> None:
-    """Clear all answers and samples from the cache.
+    """Clear all results and samples from the cache.
 
+    Examples
+    --------
     >>> hrsynth.clear_cache()
     """
     forget_answers()
@@ -82,14 +85,14 @@ def clear_cache() -> None:
 
 
 def forget_answers() -> None:
-    """Forget the answers alone."""
+    """Clear the results alone."""
     for memory in (_ANSWERS, _GRIDS):
         memory.kept.clear()
 
 
 def require_kinds(kinds: Mapping[str, list[str]], options: Mapping[str, Option], given: Mapping[str, Any]) -> None:
-    """Raise ``BadRequest`` for an argument that is no number, text or truth value where the signature asks for one, or
-    a number out of its range."""
+    """Raise ``BadRequest`` for an argument that is no number, text or truth value where the signature needs one, or a
+    number out of its range."""
     for name, value in given.items():
         option = options.get(name)
         kind, *none = kinds[name]
@@ -105,15 +108,13 @@ def require_kinds(kinds: Mapping[str, list[str]], options: Mapping[str, Option],
 def analysis(
     place: int, *, examples: tuple[str, ...], seeded: bool = True, formations: bool = False, **old: str
 ) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """A function of a robot whose answers are frozen values: the robot is also taken by its name or path, and what was
-    asked before is not computed again. ``old`` names of options, each with the one that it has now, are taken for one
-    version more. ``formations``: whether it can be asked of several bodies; else these are refused.
+    """Declare an analysis: a function of a robot with a frozen result.
 
-    Everything else that is said of it is its :class:`Declaration`: its options stand in the annotations of its
-    parameters, what it answers in the first lines of its docstring. The index of all analyses is made of these
-    (:mod:`hrsynth.index`).
-
-    The same question is one with equal arguments about an equal robot, read from the same file.
+    The robot is also accepted by its name or path, and results are cached. ``old`` option names, each with its new
+    name, are accepted for one version more. ``formations``: it also accepts several platform links. All else is in its
+    :class:`Declaration`: options are in the annotations of its parameters, its summary is the first paragraph of the
+    docstring. The index of all analyses is made of these (:mod:`hrsynth.index`). Calls are the same with equal
+    arguments and an equal robot, read from the same file.
     """
 
     def made(function: Callable[P, R]) -> Callable[P, R]:
@@ -145,9 +146,9 @@ def analysis(
             source = robot if isinstance(robot, Mechanism) else robot.robot
             if source.formation and not formations:
                 raise BadRequest(
-                    f"{source.name}: {function.__name__} is about one platform, and this is a formation",
+                    f"{source.name}: {function.__name__} needs one platform, and this is a formation",
                     ", ".join(source.bodies),
-                    "a file with a <platform>, or derive, legs, check",
+                    remedy="Name a <platform> in the file, or use derive, legs or check.",
                 )
             if any(given.get(name) is not None for name in ("seconds", "into")):
                 return function(*bound.args, **bound.kwargs)

@@ -46,14 +46,14 @@ MEASURES = ("type2", "type1", "constraints", "condition", "mm_per_degree", "degr
 
 @dataclass(frozen=True, eq=False, repr=False)
 class GridCheck(Value):
-    """The postures over a grid of poses, in its order; None where a pose is not reached."""
+    """Configurations over a grid of poses, in its order; None where a pose is not reached."""
 
     grid: Annotated[Grid, FLAT]
     postures: tuple[ConfigurationReport | None, ...]
     free: Recorded[tuple[str, ...]]
-    """The parts of the pose that are neither varied nor held."""
+    """Parts of the pose that are neither varied nor fixed."""
     dependent: str | None = None
-    """That parts of its poses depend on each other, where some are not reached."""
+    """Statement that parts of its poses depend on each other, if some are not reached."""
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -87,15 +87,28 @@ class Unreached(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Check(Result, shown_as="check"):
-    """What is observed, the postures at the requested poses, and the loop constraints that are redundant at
-    generic ones."""
+    """Results of a check at poses.
+
+    Parameters
+    ----------
+    setup
+        Robot with observations and samples.
+    postures
+        Report on the configuration at each requested pose.
+    redundant
+        Loop constraints that are redundant at generic configurations.
+    grid
+        Results over a grid, if requested.
+    unreached
+        Requested poses that the robot does not reach.
+    """
 
     setup: Annotated[ObservedRobot, FLAT]
     postures: Annotated[tuple[ConfigurationReport, ...], As("configurations")]
     redundant: Recorded[tuple[Redundancy, ...]]
     grid: Recorded[GridCheck | None] = None
     unreached: tuple[PoseNotReached, ...] = ()
-    """The poses asked for that the robot does not reach, and why."""
+    """Requested poses that the robot does not reach, with the reason."""
 
     @property
     @recorded(As("characteristic_length"))
@@ -109,7 +122,7 @@ class Check(Result, shown_as="check"):
         return self.setup.mobility_if_written
 
     def require_answered(self, at: Any = None, **asked: Any) -> None:
-        """Raise ``RankUndecided`` and ``PoseNotReached`` at poses that were asked for."""
+        """Raise ``RankUndecided`` or ``PoseNotReached`` for requested poses."""
         for posture in self.postures if at else ():
             if not posture.decided:
                 raise RankUndecided(f"{self.setup.robot.name} at {posture.pose}", posture.gap, RANK_GAP)
@@ -121,7 +134,9 @@ class Check(Result, shown_as="check"):
         dof, states = self.setup.dof, list[str]()
         for each in self.postures:
             rank = each.hidden.rank
-            states.append(f"{each.pose} {each.hidden.state}" + ("" if rank == dof else f", shows {rank} of {dof}"))
+            states.append(
+                f"{each.pose} {each.hidden.state}" + ("" if rank == dof else f", observes {rank} of {dof} dof")
+            )
         states += [f"{each.pose} not reached" for each in self.unreached]
         return f"{self.setup.headline()}: {'; '.join(states)}"
 
@@ -134,27 +149,40 @@ class Check(Result, shown_as="check"):
 
 
 class LoopMobility(NamedTuple):
-    """Freedoms of the file's own links and joints."""
+    """Mobility of the mechanism as the file describes it."""
 
     total: int
 
 
 class LoopRank(NamedTuple):
-    """The rank of all constraints of the loops at a generic configuration, and what it rests on."""
+    """Rank of all loop constraints at a generic configuration, with its margins."""
 
     loops: Annotated[tuple[str, ...], "the loops, and the couplings of joints"]
-    coordinates: Annotated[int, "coordinates of the joints, those at which loops are cut included"]
+    coordinates: Annotated[int, "joint coordinates, including those of joints at which loops are cut"]
     rows: Annotated[int, "constraints of the loops"]
-    rank: Annotated[int, "how many of them are independent"]
+    rank: Annotated[int, "number of independent ones"]
     gap: Annotated[float, GAP]
-    smallest_kept: Annotated[float, "the smallest singular value that counts, as part of the largest"]
-    largest_dropped: Annotated[float, "the largest that does not count, as part of the largest: rounding at least"]
+    smallest_kept: Annotated[float, "smallest singular value that counts, relative to the largest"]
+    largest_dropped: Annotated[float, "largest one that does not count, relative to the largest: at least rounding"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LoopCheck(Result, shown_as="loop_check"):
-    """What the loops alone say, where no platform or no segment can be looked at: mobility, the constraints' rank, and
-    the redundant ones; and what it takes to say ``more``."""
+    """Loop check, for a mechanism without a known platform or segment.
+
+    Parameters
+    ----------
+    robot
+        Mechanism as read.
+    mobility
+        Mobility of its links and joints.
+    constraints
+        Rank of the loop constraints, with its margins.
+    redundant
+        Redundant constraints by loop.
+    more
+        What a full check needs.
+    """
 
     robot: Mechanism
     mobility: Recorded[LoopMobility]
@@ -164,7 +192,8 @@ class LoopCheck(Result, shown_as="loop_check"):
 
     @classmethod
     def of(cls, robot: Mechanism, why: str) -> LoopCheck:
-        """That of a mechanism, and ``why`` no more can be said; raises ``NotSampled``, ``RankUndecided``, ``Shaky``."""
+        """Return the loop check of a mechanism, and ``why`` no more is possible; raises ``NotSampled``,
+        ``RankUndecided``, ``InfinitesimalMobility``."""
         model = PinocchioModel(robot)
         start = ClosedConfiguration.of(model, model.q0)
         names, sizes = model.blocks
@@ -186,7 +215,7 @@ class LoopCheck(Result, shown_as="loop_check"):
         return self.robot.length
 
     def said(self) -> tuple[Any, ...]:
-        """What is compared."""
+        """Return what equality compares."""
         return self.robot, self.to_dict()
 
     def headline(self) -> str:
@@ -225,25 +254,47 @@ def check(
 ) -> Checked:
     """Mobility, ranks, singularities and redundant constraints at poses, and over a grid of poses.
 
-    Mobility, ranks with gaps, Type 1, 2, 3, Zlatanov's six numbers, constraint singularities and redundant
-    constraints (docs/pages/theory.md, section 7) at the poses ``at`` (default: the zero configuration) and over
-    ``grid``.
+    Parameters
+    ----------
+    robot
+        Mechanism, observed robot, path of a file, name of a shipped robot, or ``example:NAME``.
+    observe
+        Leg labels or link names; default: what the file observes, else all legs.
+    camera
+        Link that carries the camera (default: the base), or named cameras ``NAME=LINK@x,y,z/r,p,y`` (m, rad).
+    sensor
+        Other observations, ``[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius`` (m, link frame).
+    at
+        Poses (m, rad, base coordinates); default: the zero configuration.
+    grid
+        Line, plane or box of poses, such as ``x=-0.3:0.3:21,y=0`` (from:to:count).
+    seed
+        Seed of the random configurations that define generic values.
 
-    Statements about the hidden robot are read from the real robot's relation with the observed directions, which is
-    that of the exact lift at every closed configuration (theory.md 3), not from the form that ``derive`` gives; those
-    about the real robot take its motors' coordinates as what is measured.
-    Generic values are those of random samples. ``observe`` and ``camera`` are as for ``derive``.
+    Returns
+    -------
+    Check or LoopCheck
+        Mobility, ranks with gaps, Type 1, 2, 3, singularity indices, constraint singularities and redundant
+        constraints; poses out of reach in ``unreached``. A ``LoopCheck`` (mobility and loop constraints only) if the
+        file names no platform or no leg has a segment, and neither poses nor observations are requested.
 
-    Where nothing more is asked, and the file leaves open which link is the platform or no leg has a segment, a
-    ``LoopCheck`` says what holds of any mechanism: mobility, the rank of the loop constraints with its gap, and which
-    of them are redundant; and what it takes to say ``more``.
+    Raises
+    ------
+    BadRequest
+        For unknown names, and for parts of a pose that the platform cannot change.
+    PoseNotReached, NoReachablePose
+        If no pose, or none of the grid, is reached.
 
-    Of several poses, those out of reach are listed in ``unreached``. Raises ``BadRequest`` for unknown names and for
-    parts of a pose that the platform cannot change, ``PoseNotReached`` if no pose is reached, ``NoReachablePose`` if
-    none of a grid is.
+    Notes
+    -----
+    Statements about the hidden robot use the real robot's velocity relation with the observed directions, which is that
+    of the exact lift at every closed configuration (theory.md 3), not the form of ``derive``. Those about the real
+    robot use its motor coordinates as measured values (docs/pages/theory.md, section 7).
 
+    Examples
+    --------
     >>> hrsynth.check("3rrr_m1", at=["x=0,y=0,phi=0", [0.01, 0, 0]])
-    <Check: 3rrr_m1, watching 1, 2, 3: x=0,y=0,z=0,phi=0deg regular; x=0.01,y=0,z=0,phi=0deg regular>
+    <Check: 3rrr_m1, observing 1, 2, 3: x=0,y=0,z=0,phi=0deg regular; x=0.01,y=0,z=0,phi=0deg regular>
     """
     poses = asked_poses(at)
     cells = None if grid is None else Grid.parse(grid)

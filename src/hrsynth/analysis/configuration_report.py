@@ -1,4 +1,4 @@
-"""One configuration under examination: ranks, kinds of singularities, distances to them, redundant constraints."""
+"""Report on one configuration: ranks, kinds of singularities, distances to them, redundant constraints."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ UNDECIDED, REGULAR, CONSTRAINT = "undecided", "regular", "constraint"
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SingularityReport(Value, all_recorded=True):
-    """What one relation says at a configuration: the freedoms that are seen, the gap of all ranks, the six counts (None
-    where the gap is too small for a verdict) and the freedoms that are not seen."""
+    """Singularities of one velocity relation at a configuration: observed dof, smallest rank gap, singularity indices
+    (None if the gap is too small for a verdict) and unobserved dof."""
 
     rank: int
-    gap: Annotated[float, "the smallest ratio of a singular value that counts to one that does not"]
+    gap: Annotated[float, "smallest rank gap"]
     singularity_indices: SingularityIndices | None
     unobserved: tuple[Freedom, ...] = ()
 
@@ -65,14 +65,12 @@ class SingularityReport(Value, all_recorded=True):
 
 @dataclass(frozen=True)
 class SingularityDistances(Record, all_recorded=True):
-    """How far a configuration is from each kind (0: there); lengths in characteristic lengths.
-
-    ``type2`` is the smallest singular value of Mᵀ on the feasible twists that are generically seen, ``type1`` one over
-    the largest, ``condition`` the largest over the smallest; None where Mᵀ does not exist even generically.
-    ``constraints`` is the weakest singular value of the loops, as part of the largest. ``millimetres`` and ``degrees``
-    are the platform's motion along its weakest freedom for each degree by which the observed directions are wrong; None
-    where it is infinite, where Mᵀ does not exist and where something else than angles is measured.
-    """
+    """Singularity distances of a configuration (0: singular); lengths in characteristic lengths. ``type2`` is the
+    smallest singular value of Mᵀ on the generically observed twists, ``type1`` one over the largest, ``condition`` the
+    largest over the smallest; None if Mᵀ does not exist even generically. ``constraints`` is the smallest singular
+    value of the loop Jacobian, relative to the largest. ``millimetres`` and ``degrees`` are the platform's motion along
+    its least observable twist per degree of direction error; None if it is infinite, if Mᵀ does not exist, or if
+    something other than angles is measured."""
 
     type2: float | None
     type1: float | None
@@ -83,7 +81,7 @@ class SingularityDistances(Record, all_recorded=True):
 
 
 class Constraint(NamedTuple):
-    """Whether the loops lose rank, and the freedoms that the platform has only here."""
+    """Constraint singularity of a configuration, with the dof that the platform has only there."""
 
     singular: bool | None
     rank_lost: int | None
@@ -92,7 +90,7 @@ class Constraint(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ConfigurationReport(OfConfiguration, Value):
-    """All that is said of one configuration."""
+    """Report on one configuration."""
 
     configuration: ClosedConfiguration
     pose: Recorded[Pose]
@@ -103,11 +101,11 @@ class ConfigurationReport(OfConfiguration, Value):
     """The real robot with its own motors; None where it has none."""
     distances: Recorded[SingularityDistances]
     gained: tuple[Freedom, ...] = ()
-    """At a constraint singularity: the freedoms that the platform has here and not in general."""
+    """At a constraint singularity: dof that the platform has here and not generically."""
     redundant: Recorded[tuple[Redundancy, ...]] = ()
     """Loop constraints that are redundant only here."""
     formation: Annotated[Formation | None, Formation, OPTIONAL] = None
-    """Of a formation: what is not seen here; ``pose`` is that of its first body."""
+    """For a formation: unobserved motions here; ``pose`` is that of its first link."""
 
     rank = Shown(int, lambda self: self.hidden.rank)
     condition = Shown(Number, lambda self: self.distances.condition)
@@ -115,7 +113,7 @@ class ConfigurationReport(OfConfiguration, Value):
     @property
     @recorded()
     def constraint(self) -> Constraint:
-        """Whether the loops lose rank, and the freedoms that the platform has only here."""
+        """Constraint singularity of a configuration, with the dof that the platform has only there."""
         lost = None if self.hidden.singularity_indices is None else self.hidden.singularity_indices.IIM
         return Constraint(self.constraint_singular, lost, self.gained)
 
@@ -128,7 +126,7 @@ class ConfigurationReport(OfConfiguration, Value):
     @cached_property
     @recorded()
     def singular_spherical_joints(self) -> dict[str, float]:
-        """S joints that stand for several R which are (nearly, rad) at a singularity of their own, which the S does not
+        """S joints that replace several R which are (nearly, rad) at a singularity of their own, which the S does not
         have (docs/pages/theory.md, section 1)."""
         return flat_wrists(self.configuration.model, self.configuration.q)
 
@@ -139,18 +137,18 @@ class ConfigurationReport(OfConfiguration, Value):
 
     @property
     def decided(self) -> bool:
-        """Whether every rank is a verdict."""
+        """True if every rank has a clear gap."""
         return self.gap >= RANK_GAP
 
     @property
     def constraint_singular(self) -> bool | None:
-        """Whether the loops have lost rank; None where that is not decided."""
+        """True if the loops have lost rank; None if that is not decided."""
         return None if self.hidden.singularity_indices is None else self.hidden.singularity_indices.IIM > 0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ConfigurationAnalysis(Value):
-    """A setting with its generic values, against which single configurations are held."""
+    """Setup with its generic values, to which single configurations are compared."""
 
     setup: ObservedRobot
 
@@ -177,14 +175,14 @@ class ConfigurationAnalysis(Value):
 
     @cached_property
     def _usually_special(self) -> bool:
-        """Whether all that is sensed of a formation lies in a line or plane everywhere."""
+        """True if all observed points of a formation lie in a line or plane at every configuration."""
         return all(special_at(at, self.setup.samples.observation_model) for at in self.setup.configurations)
 
     def _real(self, at: ClosedConfiguration) -> VelocityRelation:
         return relation_of(at, self.setup.samples.observation_model, np.eye(at.model.nv)[at.model.actuated_indices()])
 
     def classify(self, at: ClosedConfiguration) -> ConfigurationReport:
-        """What can be said without names: no freedoms, no redundant constraints."""
+        """Report without names: no dof, no redundant constraints."""
         setup = self.setup
         found = relation(at, setup.samples.observation_model)
         told = relation(at, replace(setup.all_samples.observation_model, observations=setup.telling_idle))
@@ -201,7 +199,7 @@ class ConfigurationAnalysis(Value):
         )
 
     def examine(self, at: ClosedConfiguration) -> ConfigurationReport:
-        """All that can be said of a configuration."""
+        """Return the full report on a configuration."""
         posture = self.classify(at)
         hidden, real = posture.hidden, posture.real
         found = relation(at, self.setup.samples.observation_model)
@@ -266,7 +264,7 @@ class ConfigurationAnalysis(Value):
         return np.asarray(beside[:, : found.dof.value - self.usual.dof])
 
     def _name_freedoms(self, at: ClosedConfiguration, twists: Array) -> tuple[Freedom, ...]:
-        """Twists (3 or 6, k) in characteristic lengths as named freedoms."""
+        """Name twists (3 or 6, k) in characteristic lengths."""
         setup = self.setup
         start = setup.all_samples.start
         at_zero = at.model is start.model and np.max(np.abs(at.q - start.q), initial=0.0) < PASSED_BY * PASSED_BY

@@ -1,4 +1,4 @@
-"""Which legs must be watched: the verdict of every set of observed legs."""
+"""Verdicts of all sets of observed legs."""
 
 from __future__ import annotations
 
@@ -35,13 +35,15 @@ from .verdict import Verdict, verdict_of
 LARGEST_COMPLETE = 10
 """Number of legs up to which all sets are listed; beyond, sets of up to three, the smallest and the whole."""
 LARGEST_FORMATION = 6
-"""The same of a formation's observations; beyond, single ones, the smallest sets and the whole."""
+"""Number of observations of a formation up to which all sets are listed; beyond, single ones, the smallest sets and the
+whole."""
 MOST_TRIED = 1024
-"""Sets of one size above which the smallest are not sought but one set of which none can be left out."""
+"""Number of sets of one size above which, instead of all smallest sets, one set is searched of which none can be left
+out."""
 
 
 class LegSet(NamedTuple):
-    """A set of watched legs."""
+    """Set of observed legs with its verdict."""
 
     verdict: Annotated[Verdict, FLAT]
     exact: bool
@@ -50,7 +52,25 @@ class LegSet(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Legs(Result, shown_as="legs"):
-    """The verdict of every set of observed legs, and the smallest sets of the best rank."""
+    """Verdict of every set of observed legs, and the smallest sets of the best rank.
+
+    Parameters
+    ----------
+    setup
+        Robot with observations and samples.
+    robot, architecture, dof
+        Name, architecture notation and platform dof.
+    sets
+        Verdict of each set.
+    exact
+        Verdict of each set for generic geometry of the same architecture.
+    complete
+        True if all sets are listed.
+    minimal, minimal_complete
+        Smallest sets of the best rank; True if these are all of them.
+    where
+        Request that replaced the zero configuration.
+    """
 
     setup: ObservedRobot
     robot: Recorded[str]
@@ -58,18 +78,18 @@ class Legs(Result, shown_as="legs"):
     dof: Recorded[int]
     sets: tuple[Verdict, ...]
     exact: tuple[ExactVerdict, ...]
-    """What generic geometry of the same architecture sees, for each of ``sets``."""
+    """Verdict for generic geometry of the same architecture, for each of ``sets``."""
     complete: Recorded[bool]
-    """Whether all sets are listed."""
+    """True if all sets are listed."""
     minimal: Recorded[tuple[tuple[str, ...], ...]] = field(default=())
     """The smallest sets of the best rank; none where that is 0, as in the catalog."""
     minimal_complete: Recorded[bool] = True
-    """Whether ``minimal`` has all smallest sets; else it has one of which none can be left out."""
+    """True if ``minimal`` has all smallest sets; else it has one of which none can be left out."""
     where: str = "the zero configuration"
-    """What took the place of the zero configuration, as it was asked for."""
+    """Request that replaced the zero configuration."""
 
     def headline(self) -> str:
-        """The robot and the smallest sets that see most."""
+        """Robot and smallest sets of the best rank."""
         return f"{self.robot}, {len(self.sets)} sets, smallest of the best rank: {self.smallest}"
 
     @property
@@ -80,7 +100,7 @@ class Legs(Result, shown_as="legs"):
     @property
     @recorded(As("sets"))
     def sets_record(self) -> list[LegSet]:
-        """The sets, each with what generic geometry of the same architecture sees."""
+        """Sets, each with its verdict for generic geometry of the same architecture."""
         return [LegSet(each, exact.exact, exact) for each, exact in zip(self.sets, self.exact, strict=True)]
 
     observations = Shown(list[ObservedAxis], lambda self: self.setup.observed_record)
@@ -89,10 +109,8 @@ class Legs(Result, shown_as="legs"):
 
 
 def _smallest(labels: tuple[str, ...], rank: Callable[[tuple[str, ...]], int]) -> tuple[list[tuple[str, ...]], bool]:
-    """The smallest sets of the rank of all, and whether these are all of them.
-
-    A set sees no more than one that holds it: whatever cannot be left out of all is in each set of that rank.
-    """
+    """Return the smallest sets of the rank of all, and True if these are all of them. A subset never has a higher rank:
+    what cannot be left out of all is in each set of that rank."""
     whole = rank(labels)
 
     def without(held: tuple[str, ...], label: str) -> tuple[str, ...]:
@@ -136,12 +154,41 @@ def legs(
     at: BeginPose = None,
     seed: Seed = 0,
 ) -> Legs:
-    """Sets of observed legs: their verdicts, the freedoms they lose, and the smallest sets that see the most.
+    """Sets of observed legs: their verdicts, the unobserved dof, and the smallest sets of the best rank.
 
-    The verdict of every set of legs (theory.md 6), on the branch of the zero configuration or of the pose ``at``
-    (``mode:2``: a mode with all legs watched): of all legs at their default segments, or of the labels or links in
-    ``observe``, together with what is seen with ``sensor``; observations count one by one.
+    Parameters
+    ----------
+    robot
+        Mechanism, observed robot, path of a file, or name of a shipped robot.
+    camera
+        Link that carries the camera (default: the base), or named cameras ``NAME=LINK@x,y,z/r,p,y`` (m, rad).
+    observe
+        Leg labels or links of which sets are made; default: all legs at their default segments.
+    sensor
+        Other observations, each counted as one.
+    at
+        Pose on whose branch the verdicts hold, or ``mode:2``, an assembly mode with all legs observed.
+    seed
+        Seed of the random configurations.
 
+    Returns
+    -------
+    Legs
+        Verdict of every set, and ``minimal``, the smallest sets of the best rank.
+
+    Raises
+    ------
+    BadRequest
+        For unknown names.
+    RankUndecided
+        If a rank has no clear gap.
+
+    Notes
+    -----
+    A set is controllable if u̇ = 0 implies t = 0 (docs/pages/theory.md, section 6).
+
+    Examples
+    --------
     >>> hrsynth.legs("3rrr_m1").minimal
     (('1', '2', '3'),)
     """

@@ -1,4 +1,4 @@
-"""From a robot to its certified hidden robot: rewriting, certificate, verdict, and the unchecked form beside it."""
+"""Derivation of the hidden robot: rewriting, equivalence check, verdict, and the unchecked form."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ STEP_SAMPLES = 3
 
 @dataclass(frozen=True, eq=False, repr=False)
 class UncheckedForm(Value):
-    """The architecture of unchecked rules, whether it is equivalent, and the freedoms that it gains or loses."""
+    """Unchecked form: its architecture, its equivalence, and the dof that it gains or loses."""
 
     hidden: Architecture
     equivalent: Recorded[bool]
@@ -71,7 +71,7 @@ class UncheckedForm(Value):
 
 
 class Notation(NamedTuple):
-    """The architectures; those of the hidden robot are null if every leg is blind."""
+    """Architectures; those of the hidden robot are null if every leg is a constant-direction leg."""
 
     real: str
     hidden: str | None
@@ -82,7 +82,31 @@ class Notation(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Derivation(Result, shown_as="derive"):
-    """A robot, what is observed, its hidden robot (None if every leg is blind), how it was derived, and the proof."""
+    """Derivation of a hidden robot.
+
+    Parameters
+    ----------
+    robot
+        Robot as read.
+    setup
+        Robot with observations and samples.
+    form
+        ``simplified`` or ``general``.
+    architecture, hidden_architecture
+        Architecture notation of the robot and of the hidden robot.
+    hidden
+        Hidden robot as a mechanism (m, rad, base coordinates), None if every leg is a constant-direction leg.
+    verdict
+        Controllability at generic configurations.
+    exact
+        Verdict for generic geometry of the same architecture.
+    taken
+        All steps; those of the observed legs were compared with the real robot all together.
+    equivalence
+        Equivalence check of the hidden robot at all samples.
+    unchecked
+        Unchecked form, None if it was not requested.
+    """
 
     robot: Mechanism
     setup: Annotated[ObservedRobot, FLAT]
@@ -92,9 +116,9 @@ class Derivation(Result, shown_as="derive"):
     hidden_architecture: Architecture | None
     verdict: Verdict
     exact: Annotated[ExactVerdict, As("architecture")]
-    """What generic geometry of the same architecture sees."""
+    """Verdict for generic geometry of the same architecture."""
     taken: tuple[Step, ...]
-    """All attempts; those of the observed legs were compared with the real robot all together."""
+    """All steps; those of the observed legs were compared with the real robot all together."""
     equivalence: Recorded[EquivalenceCheck]
     unchecked: Annotated[UncheckedForm | None, As("unchecked_form")]
 
@@ -108,8 +132,8 @@ class Derivation(Result, shown_as="derive"):
     @property
     @recorded()
     def equal_where(self) -> tuple[str, ...]:
-        """Conditions under which ρ is the real robot's at a closed configuration of the branch, be it singular
-        (theory.md, section 4); elsewhere the hidden robot may have more or fewer singularities."""
+        """Conditions under which ρ equals that of the real robot at a closed configuration of the branch, even a
+        singular one (theory.md, section 4); elsewhere the hidden robot may have more or fewer singularities."""
         return tuple(dict.fromkeys(each for step in self.taken if step.accepted for each in step.keeps))
 
     @property
@@ -124,16 +148,16 @@ class Derivation(Result, shown_as="derive"):
         return self.setup.mobility
 
     def headline(self) -> str:
-        """The robot, the legs watched, the hidden robot and the verdict."""
+        """Robot, observed legs, hidden robot and verdict."""
         legs = ", ".join(self.setup.labels)
         return (
-            f"{self.robot.name} {self.architecture}, watching {legs}: "
+            f"{self.robot.name} {self.architecture}, observing {legs}: "
             f"hidden robot {self.hidden_architecture or 'none'}, {self.verdict.verdict}"
         )
 
     def modes(self, at: PoseLike | None = None, *, real: bool = False) -> AssemblyModes:
-        """All poses with the directions (``real``: the motors' coordinates) of the pose ``at``, as ``hrsynth.modes``
-        lists them."""
+        """Return all poses with the directions (``real``: the motor coordinates) of the pose ``at``, as
+        ``hrsynth.modes`` does."""
         from .modes.modes import modes
 
         return modes(self.setup, at=at, real=real)
@@ -141,7 +165,7 @@ class Derivation(Result, shown_as="derive"):
     @property
     @recorded()
     def notation(self) -> Notation:
-        """The architectures; those of the hidden robot are null if every leg is blind."""
+        """Architectures; those of the hidden robot are null if every leg is a constant-direction leg."""
         real, hidden = self.architecture, self.hidden_architecture
         if hidden is None:
             return Notation(real.unicode, None, real.ascii, None, None)
@@ -178,26 +202,55 @@ def derive(
     unchecked: bool = True,
     seed: Seed = 0,
 ) -> Derivation:
-    """The hidden robot of a robot, how it is derived, its certificate, and what the controller can see.
+    """Hidden robot of a robot, with its derivation, equivalence check and controllability verdict.
 
-    The certified hidden robot of a robot and the legs that are watched (MMT 3.2; docs/pages/theory.md, sections 3 to
-    5).
+    Parameters
+    ----------
+    robot
+        Mechanism, observed robot, path of a file, name of a shipped robot, or ``example:NAME``.
+    observe
+        Leg labels or link names; default: what the file observes, else all legs.
+    camera
+        Link that carries the camera (default: the base), or named cameras ``NAME=LINK@x,y,z/r,p,y`` (m, rad).
+    sensor
+        Other observations, ``[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius`` (m, link frame).
+    at
+        Pose that replaces the zero configuration, in another operation mode if necessary, or ``mode:2``, one of its
+        assembly modes.
+    form
+        ``simplified`` (all rules) or ``general`` (sliders, all legs kept).
+    unchecked
+        True to also return the unchecked form.
+    seed
+        Seed of the random configurations.
 
-    ``observe`` holds leg labels or link names (default: what the robot observes, else all legs); ``camera`` names the
-    link that carries the camera (default: the base), or further cameras, and ``sensor`` says what these see
-    (:func:`hrsynth.observe`); ``at`` is a pose that replaces the zero configuration, in another operation mode if
-    necessary, or one of its modes (``mode:2``); an observed robot already has all of that. ``form`` is ``simplified``
-    or ``general``; ``unchecked``: also give the form of unchecked rules. Raises ``BadRequest`` for unknown names,
-    ``NoEquivalentRobot`` if even the exact lift fails.
+    Returns
+    -------
+    Derivation
+        Hidden robot (a :class:`Mechanism`, None if every leg is a constant-direction leg), steps, equivalence check at
+        all samples, verdict.
 
+    Raises
+    ------
+    BadRequest
+        For unknown names.
+    NoEquivalentRobot
+        If even the exact lift fails the equivalence check.
+
+    Notes
+    -----
+    MMT 3.2; docs/pages/theory.md, sections 3 to 5. An observed robot already has its observations.
+
+    Examples
+    --------
     >>> found = hrsynth.derive("3rrr_m1", [1, 2, 3])
     >>> found
-    <Derivation: 3rrr_m1 3-R̲RR, watching 1, 2, 3: hidden robot 3-ΠR̲R, controllable>
+    <Derivation: 3rrr_m1 3-R̲RR, observing 1, 2, 3: hidden robot 3-ΠR̲R, controllable>
     >>> found.verdict == "controllable"
     True
     """
     if form not in FORMS:
-        raise BadRequest("unknown form", form, tuple(FORMS))
+        raise BadRequest("--form", form, tuple(FORMS))
     setup = observed_robot(robot, observe, camera, sensor=sensor, at=at, seed=seed)
     decomposition, samples = setup.decomposition, setup.samples
     verdict = verdict_of(setup, setup.labels, samples)
@@ -237,7 +290,8 @@ def derive(
 
 
 def _certify(setup: ObservedRobot, state: State, samples: Samples) -> tuple[Mechanism | None, EquivalenceCheck]:
-    """The hidden robot, None where every leg is blind, and its certificate at all samples."""
+    """Return the hidden robot (None if every leg is a constant-direction leg) and its equivalence check at all
+    samples."""
     if not state.actuators:
         return None, _blind(samples)
     report("certificate")
@@ -265,9 +319,9 @@ def finish_robot(setup: ObservedRobot, state: State) -> Mechanism:
 
 
 def _as_legs(hidden: Mechanism, turns: bool) -> Mechanism:
-    """A mechanism that says whether its platform ``turns`` where its joints do not, with its observations; a segment
-    that is in none of its legs (of a single leg the platform) as a direction of its link. Where no leg ends on the
-    base, as of a formation, it stays as it is."""
+    """Set on a mechanism whether its platform ``turns``, if its joints leave that open, and its observations; a segment
+    in none of its legs (of a single leg the platform) becomes a direction of its link. Without a leg on the base, as in
+    a formation, it stays as it is."""
     told = tuple(
         replace(o, seen_from=hidden.reference) if isinstance(o, Direction) and o.by_segment else o
         for o in hidden.observations
@@ -290,8 +344,8 @@ def _check(samples: Samples, count: int | None) -> Check:
 def _fallback(
     setup: ObservedRobot, evidence: Evidence, samples: Samples, failed: EquivalenceCheck, asked: Strategy
 ) -> tuple[Rewriting, Mechanism, EquivalenceCheck]:
-    """Where the certificate at all samples sees what three did not: check every step of the form that was asked for at
-    all samples, then of the general form."""
+    """Repeat the derivation if the check at all samples fails after that at three: check every step of the requested
+    form at all samples, then of the general form."""
     for run in dict.fromkeys((asked, GENERAL)):
         again = run(Rewriting.of(evidence, _check(samples, None)))
         hidden = finish_robot(setup, again.state)
@@ -302,7 +356,7 @@ def _fallback(
 
 
 def _blind(samples: Samples) -> EquivalenceCheck:
-    """What is certified where every leg is blind: the directions do not move at all."""
+    """Return the equivalence check of constant-direction legs: the directions do not move at all."""
     angle = max(
         float(np.linalg.norm(member.relation.rates, 2)) if member.relation.dimension else 0.0
         for member in samples.members
@@ -327,7 +381,9 @@ def _unchecked_form(
     for rewriting in apply_unchecked(evidence, change_ends=change):
         architecture = rewriting.state.architecture()
         if architecture == certified:
-            return UncheckedForm(architecture, True, certificate.largest_angle, reason="it is the certified form")
+            return UncheckedForm(
+                architecture, True, certificate.largest_angle, reason="it is the form that passed the equivalence check"
+            )
         found = check_equivalence(samples, rewriting.state.mechanism, count=STEP_SAMPLES, complete=False)
         if found.passed:
             reason = "equivalent, but not the simplest form"
@@ -339,7 +395,7 @@ def _unchecked_form(
 
 
 def _planar(samples: Samples) -> bool:
-    """Whether all platform motions are those of one plane."""
+    """Return True if all platform motions are those of one plane."""
     twists = np.hstack([member.relation.twists for member in samples.members])
     if twists.shape[0] == 3:
         return range_basis(twists, 1.0)[1].value <= 2
@@ -349,7 +405,7 @@ def _planar(samples: Samples) -> bool:
 def _exchanged_freedoms(
     decomposition: LegDecomposition, found: EquivalenceCheck
 ) -> tuple[tuple[Freedom, ...], tuple[Freedom, ...]]:
-    """The platform's freedoms that a wrong hidden robot gains and loses, at the configuration where they differ."""
+    """Return the platform dof that a non-equivalent robot gains and loses, at the configuration where they differ."""
     if found.mismatch is None or found.mismatch.real.twist_rows != 6:
         return (), ()
     real, hidden, position = found.mismatch.real, found.mismatch.hidden, found.mismatch.position

@@ -1,19 +1,18 @@
 """Exact verdicts of an architecture: ranks over the rationals at random instances (docs/pages/proofs.md, section 12).
 
-F is the irreducible family of geometries with all relations that persist in the robot's motion, an instance one of its
-rational members. With A the constraints, X the platform's twist and Y the rates of the directions, the legs see
-rank X − rank [X; Y] + rank Y of the platform's freedoms, ranks on ker A.
+F is the irreducible family of geometries with all incidences that persist in the robot's motion, an instance one of its
+rational members. With A the constraints, X the platform's twist and Y the rates of the directions, the observed rank of
+the platform is rank X − rank [X; Y] + rank Y, ranks on ker A.
 
 *Proved*: almost all members of F are controllable. Its premises, numbered as in section 12:
-
-1. every relation of F holds on the robot's branch, carried or kept (:attr:`ExactArchitecture.basis`; merely *observed*
-   ones are named, and the word is not *proved*);
+1. every incidence of F holds on the robot's branch, structural or loop-invariant (:attr:`ExactArchitecture.basis`;
+   merely *sampled* ones are listed, and the verdict is not *proved*);
 2. rank [A; Y] = rank [A; Y; X] at one instance: exact (:meth:`ExactArchitecture._rank`);
 3. rank [A; Y; X] there is the largest on F, except for a chance (:meth:`ExactArchitecture._chance`);
 4. the robot is a regular member of F: numerical (:meth:`ExactArchitecture._regular`).
 
-A *deficient* verdict holds the largest rank of several instances: it is probabilistic. What a single link's dimensions
-make special (three centres on a line) belongs to a robot, not to its architecture; it may see less, never more.
+A *deficient* verdict has the largest rank of several instances: it is probabilistic. What a single link's dimensions
+make special (three centres on a line) belongs to a robot, not to its architecture; its rank may be lower, never higher.
 """
 
 from __future__ import annotations
@@ -56,38 +55,38 @@ TESTS = 3
 
 @dataclass(frozen=True)
 class Basis(Record):
-    """What the relations of an architecture rest on: how many are ``carried`` by links and joints, how many closed
-    loops keep besides, and those merely ``observed``, in words."""
+    """Basis of the incidences of an architecture: number of structural and of loop-invariant ones, and the sampled ones
+    in words."""
 
     structural: Recorded[int]
     loop_invariant: Recorded[int]
     sampled: Recorded[tuple[str, ...]]
     largest_defect_held: Annotated[float, As("largest_defect_held")] = 0.0
-    """The largest defect (sines, characteristic lengths) of a relation that counts as held."""
+    """Largest defect (sines, characteristic lengths) of an incidence that counts."""
     smallest_defect_not_held: Annotated[float | None, As("smallest_defect_not_held")] = None
-    """The smallest one of a relation that nearly holds and does not count."""
+    """Smallest defect of an incidence that does not count."""
 
     @property
     def nearly(self) -> str:
-        """What nearly holds, or holds only nearly, in words; empty where nothing does."""
+        """Describe incidences that nearly hold; empty without any."""
         text = (
-            f"; relations that miss by up to {self.largest_defect_held:.1e} count as held"
+            f"; incidences with a defect up to {self.largest_defect_held:.1e} count"
             if self.largest_defect_held > CLOSED
             else ""
         )
         return text + (
             ""
             if self.smallest_defect_not_held is None
-            else f"; a relation misses by {self.smallest_defect_not_held:.1e} and does not count"
+            else f"; an incidence with a defect of {self.smallest_defect_not_held:.1e} does not count"
         )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ExactVerdict(Compared):
-    """What an architecture's generic geometry sees with some legs observed.
+    """Verdict for the generic geometry of an architecture with some legs observed.
 
-    ``verdict`` and ``rank`` are None where it is not ``exact``; ``reason`` says why. ``instances`` counts the random
-    instances that carry the verdict: one where it is controllable. ``chance`` bounds that of an error where it is
+    ``verdict`` and ``rank`` are None unless it is ``exact``; ``reason`` explains it. ``instances`` counts the random
+    instances behind the verdict: one if it is controllable. ``chance`` bounds the probability of an error if it is
     ``proved`` by identities that were tested at random instances.
     """
 
@@ -101,12 +100,14 @@ class ExactVerdict(Compared):
     proved: Recorded[bool] = False
     chance: Recorded[float] = 0.0
     basis: Annotated[Basis | None, As("relations")] = None
-    trivial: Annotated[int | None, int, OPTIONAL, "of a formation: how many unseen motions are trivial"] = None
-    """Of a formation: how many independent unseen motions are trivial."""
+    trivial: Annotated[
+        int | None, int, OPTIONAL, "of a formation: number of trivial motions among the unobserved ones"
+    ] = None
+    """For a formation: number of independent unobserved motions that are trivial."""
 
 
 class ExactArchitecture:
-    """The architecture of a mechanism: answers for any set of its observed directions.
+    """Exact architecture of a mechanism: verdicts for any set of its observed directions.
 
     ``relation`` is ρ at a generic configuration for all ``observations``: what an instance must reproduce; ``start``
     is the mobility at the first configuration of the relations, the zero configuration.
@@ -126,8 +127,8 @@ class ExactArchitecture:
         self.relation = relation
         self.start = relation.mobility if start is None else start
         self.dof = relation.dof.value
-        self.obstacle = "gears are not part of exact geometry" if mechanism.couplings else relations.doubt
-        """Why there are no instances; empty as long as there are."""
+        self.obstacle = "couplings are not part of exact geometry" if mechanism.couplings else relations.doubt
+        """Reason why there are no instances; empty if there are."""
         self._places = {o.key: i for i, o in enumerate(self.observations)}
         self._instances: list[Instance] = []
         self._answers: dict[tuple[tuple[str, ...], ...], ExactVerdict] = {}
@@ -175,18 +176,19 @@ class ExactArchitecture:
         if chance:
             reason += f", except for a chance below {power_above(chance)}"
         if basis.sampled:
-            reason += f" of geometry with {len(basis.sampled)} relations observed at samples ({basis.sampled[0]})"
+            reason += f" of geometry with {len(basis.sampled)} sampled incidences ({basis.sampled[0]})"
         reason += basis.nearly
         said = word(seen, self.dof) if trivial is None else formation_word(self.dof - seen - trivial)
         return ExactVerdict(legs, said, seen, self.dof, True, instances, reason, proved, chance, basis, trivial)
 
     def _trivial(self, observed: Sequence[Observation]) -> int:
-        """How many independent trivial motions there are: the least of several instances."""
+        """Return the number of independent trivial motions: the least of several instances."""
         places = [self._places[o.key] for o in observed]
         return min(self._count_similarities(self.instance(i), places) for i in range(INSTANCES))
 
     def _count_similarities(self, found: Instance, places: Sequence[int]) -> int:
-        """How many independent similarities take along all that is sensed, at an instance, in motions not seen."""
+        """Return the number of independent similarities that move all observed points together, at an instance, in
+        unobserved motions."""
         draws = [(random_numbers(3, self._random), random_numbers(3, self._random)) for _ in range(PLACES)]
         parts = [
             part
@@ -202,7 +204,8 @@ class ExactArchitecture:
 
     @cached_property
     def basis(self) -> Basis:
-        """What the relations rest on; raises ``NotRecognised`` where the robot is no regular member of its family."""
+        """Return the basis of the incidences; raises ``NotRecognised`` if the robot is no regular member of its
+        family."""
         every = ties(self.relations)
         known = carried_by_joints(self.mechanism, self.relations, every)
         left = [tie for tie, holds in zip(every, known, strict=True) if not holds]
@@ -215,20 +218,21 @@ class ExactArchitecture:
         return Basis(len(every) - len(left), kept_too, observed, self.relations.held, finite(missed))
 
     def _regular(self) -> bool:
-        """Whether the zero configuration is a regular member of the family, as the instance is; a sample must be."""
+        """Return True if the zero configuration is a regular member of the family, as the instance is; a sample must
+        be."""
         ranks = self.instance(0).geometry.ranks
         if ranks_at(self.relations, 0) == ranks:
             return True
         if ranks_at(self.relations, -1) != ranks:
-            raise NotRecognised("its geometry is not recognised: it is more special than its relations say")
+            raise NotRecognised("its geometry is not recognised: it is more special than its incidences imply")
         return False
 
     def _all_kept(self, every: Sequence[GeometricIncidence]) -> bool:
-        """Whether the motions of each of some instances keep all relations."""
+        """Return True if the motions of each of some instances preserve all incidences."""
         return all(all(are_kept(every, self.relations, self.instance(i))) for i in range(TESTS))
 
     def _chance(self, observed: Sequence[Observation]) -> float:
-        """A bound of the chance that an identity on which *proved* rests is none (0: there are none to test)."""
+        """Bound of the probability that an identity on which *proved* depends is false (0: none is tested)."""
         places = [self._places[o.key] for o in observed]
         found = [self.instance(0)]
         spins = sum(self._spins(link, places) for link in self.mechanism.links)
@@ -244,7 +248,7 @@ class ExactArchitecture:
         return tested * (degree(self.relations, len(found[0].free) + DEGREE * rows) / (2 * LARGEST_RANDOM)) ** TESTS
 
     def _spins(self, link: str, places: Sequence[int]) -> bool:
-        """Whether a link is a rod between two S joints that can spin unseen."""
+        """Return True if a link is a rod between two S joints that can spin unobserved."""
         joints = self.mechanism.joints_of(link)
         if (
             len(joints) != 2
@@ -275,9 +279,9 @@ class ExactArchitecture:
         if unknown:
             odd = unknown[0]
             raise NotRecognised(
-                f"the measurement of link {odd.link} is not a direction, and not among what is observed"
+                f"the observation of link {odd.link} is not a direction and not requested"
                 if has_exact_rates(odd)
-                else f"what is measured by {odd.kind} {odd.leg} is not rational"
+                else f"the measured value of {odd.kind} {odd.leg} is not rational"
             )
         places = [self._places[o.key] for o in observed]
         dimension = select_relation(self.relation, places).dimension
@@ -286,7 +290,7 @@ class ExactArchitecture:
             together, rates = self.instance(number).ranks(places)
             _same("dim ρ of these legs", together, dimension)
             best = max(best, self.dof - together + rates)
-            if best == self.dof > 0:  # that nothing moves at one instance does not say that nothing does at others
+            if best == self.dof > 0:  # another instance may have motions where this one has none
                 return best, 1
         return best, INSTANCES
 
@@ -324,5 +328,6 @@ def power_above(chance: float) -> str:
 def _same(what: str, here: int, there: int) -> None:
     if here != there:
         raise NotRecognised(
-            f"its geometry is not recognised: {what} is {there}, but {here} where only what persists in motion is kept"
+            f"its geometry is not recognised: {what} is {there}, but {here} with only the incidences that "
+            "persist in motion"
         )

@@ -1,9 +1,9 @@
-"""What observations between bodies see of a formation: all but the motions that none of its kind could tell.
+"""Unobserved motions of a formation: trivial motions and flexes.
 
-A motion that changes no measured value is *trivial* where one similarity (v, ω, s) takes everything along that is
-sensed: v(x) = v + ω × x + s x for points, turns by ω, whatever the poses are. What is left are flexes
-(docs/pages/control_a_formation.md). What an observation senses of a link are the wrenches that it transmits when it is
-held, over all places of the other link: a rule for all kinds, in floating point and over the rationals.
+A motion that changes no measured value is *trivial* if one similarity (v, ω, s) moves all observed points and
+directions: v(x) = v + ω × x + s x for points, rotations by ω, at all poses. All others are flexes
+(docs/pages/control_a_formation.md). An observation constrains a link by the wrenches that it transmits when its value
+is fixed, over all poses of the other link: one rule for all kinds, in floating point and over the rationals.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ PLACES = 4
 """Places of the other link at which an observation's wrenches are taken: no kind senses more than six of one link, and
 each place adds one at least."""
 AWAY = 10.0
-"""How far away these places are (characteristic lengths): outside of what is seen."""
+"""Distance of these points (characteristic lengths): outside of the formation."""
 ALL_SETS = 8
 """Number of bodies up to which flexes are sought in all sets of them; beyond, in sets of one, two, and in all."""
 
@@ -46,7 +46,7 @@ def word(flexes: int) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Sensed:
-    """What one observation senses of one link: ``rows`` (k, 6), wrenches on the link's twist at the origin; a scaling
+    """Constraint of one observation on one link: ``rows`` (k, 6), wrenches on the link's twist at the origin; a scaling
     moves the link as its ``point`` (3,)."""
 
     link: str
@@ -57,8 +57,8 @@ class Sensed:
 def sense_links(
     seen: Observation, reference: str, at: ViewGeometry, places: Sequence[tuple[Numbers, Numbers]]
 ) -> Iterator[Sensed]:
-    """What an observation senses of its two links; nothing beyond their relative motion where it has no wrenches (an
-    encoder). ``places`` are points and directions where the other link might be."""
+    """Return the constraints of an observation on its two links; only those on their relative motion if it has no
+    wrenches (an encoder). ``places`` are points and directions where the other link might be."""
     if not isinstance(seen, CameraObservation | SeenAxis):
         return
     for link, point, others in (
@@ -76,8 +76,8 @@ def similarities(point: Numbers) -> Numbers:
 
 
 def following(found: Iterable[Sensed], twists: Mapping[str, Numbers]) -> tuple[Numbers, Numbers]:
-    """Rows (n, k) and (n, 7) of what motions with these ``twists`` (6, k) at the origin, and similarities, do to what
-    is sensed; a link without twists rests."""
+    """Return the rows (n, k) and (n, 7) by which motions with these ``twists`` (6, k) at the origin, and similarities,
+    change the observed points; a link without twists is fixed."""
     motions, common = [], []
     columns = next(iter(twists.values())).shape[1]
     for each in found:
@@ -89,7 +89,8 @@ def following(found: Iterable[Sensed], twists: Mapping[str, Numbers]) -> tuple[N
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Flex(Value, all_recorded=True):
-    """``count`` independent motions of some links while all others rest and no measured value changes."""
+    """Flex, a motion of some links while all others are fixed and no measured value changes. It has ``count``
+    independent motions."""
 
     links: tuple[str, ...]
     count: int
@@ -108,8 +109,8 @@ class Similarities(Value):
 
     @classmethod
     def of(cls, S: Array, centre: Array, length: float) -> Similarities | None:
-        """Those that a space S (7, k) of rates (v, ω, s) about a centre (m), in characteristic lengths, generates; None
-        where it ties a turn or a scale to another motion."""
+        """Return those that a space S (7, k) of rates (v, ω, s) about a centre (m), in characteristic lengths,
+        generates; None if it couples a rotation or a scaling to another motion."""
         shifts = range_basis((S @ kernel_basis(S[3:], 1.0)[0])[:3], 1.0)[0]
         axes = range_basis((S @ kernel_basis(S[6:], 1.0)[0])[3:6], 1.0)[0]
         scaled = bool(np.linalg.norm(S[6]) > NAMED)
@@ -117,7 +118,7 @@ class Similarities(Value):
         rows = np.vstack([np.zeros((0, 3)), *(across @ (hat(each[3:6]) + each[6] * np.eye(3)) for each in S.T)])
         shifted = (across @ S[:3]).T.ravel()
         U, sizes, V = np.linalg.svd(rows, full_matrices=False)
-        told = sizes > NAMED  # of translations alone they are rounding, and tell no place
+        told = sizes > NAMED  # of translations alone they are rounding, and define no centre
         fixed = -V[told].T @ (U[:, told].T @ shifted / sizes[told])
         tied = np.linalg.norm(rows @ fixed + shifted) + np.linalg.norm(S[3:6] - axes @ (axes.T @ S[3:6]))
         if shifts.shape[1] + axes.shape[1] + scaled != S.shape[1] or tied > NAMED:
@@ -125,8 +126,8 @@ class Similarities(Value):
         return cls(shifts, axes, scaled, centre + length * fixed)
 
     def nearest(self, points: Array, wanted: Array) -> tuple[float, Array, Array]:
-        """s, R and t that take points (n, 3) nearest to those that are ``wanted``: means and sizes made equal, then
-        the turn of least squares (W. Kabsch, Acta Cryst. A32, 1976, 922)."""
+        """Return s, R and t that take points (n, 3) nearest to those that are ``wanted``: means and sizes made equal,
+        then the least-squares rotation (W. Kabsch, Acta Cryst. A32, 1976, 922)."""
         one, other = (
             self.centre + self.shifts @ (self.shifts.T @ (each.mean(axis=0) - self.centre)) for each in (points, wanted)
         )
@@ -145,15 +146,16 @@ class Similarities(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Formation(Value):
-    """What observations do not see of a formation at a configuration: trivial motions by name, and flexes; ``special``
-    is the line or plane in which all points lie here that are sensed, and generically do not."""
+    """Unobserved motions of a formation at a configuration: trivial motions by name, and flexes; ``special`` is the
+    line or plane through all observed points here, if there is none generically."""
 
     bodies: Recorded[tuple[str, ...]]
     trivial: Recorded[tuple[str, ...]]
     flexes: Recorded[tuple[Flex, ...]]
-    special: Annotated[str, "the line or plane that holds all sensed points here, but not generically"] = ""
+    special: Annotated[str, "line or plane through all observed points here, but not generically"] = ""
     group: Similarities | None = None
-    """All that the trivial motions make of what is sensed, where that is told by turns and scales about one place."""
+    """Transformations of the observed points by trivial motions, if rotations and scalings about one point describe
+    them."""
 
     @property
     def verdict(self) -> str:
@@ -162,7 +164,7 @@ class Formation(Value):
 
     @property
     def count(self) -> int:
-        """How many independent flexes there are."""
+        """Number of independent flexes."""
         return sum(each.count for each in self.flexes)
 
 
@@ -172,7 +174,7 @@ def formation_at(
     found: VelocityRelation,
     decomposition: LegDecomposition,
 ) -> Formation:
-    """What ``found``, ρ at a configuration, leaves unseen."""
+    """Return the motions that ``found``, ρ at a configuration, leaves unobserved."""
     bodies, length = (observation_model.platform, *observation_model.others), at.model.length
     told, points = seen_at(at, observation_model)
     centre = points.mean(axis=0) if len(points) else np.zeros(3)
@@ -225,7 +227,7 @@ def seen_at(
 
 
 def _scale(part: Sensed, length: float) -> Sensed:
-    """The same in characteristic lengths, unit rows."""
+    """Return the rows in characteristic lengths, normalised."""
     rows = part.rows * np.repeat([length, 1.0], 3)
     size = np.linalg.norm(rows, axis=1, keepdims=True)
     return replace(part, point=part.point / length, rows=rows / np.where(size > 0, size, 1.0))
@@ -247,19 +249,19 @@ def _common_names(
         v = (turning @ np.linalg.lstsq(turning[3:6], axis, rcond=None)[0])[:3]
         v = v - shifts @ (shifts.T @ v)
         through = "" if not anchored else f" through {point_text(centre + length * np.cross(axis, v))}"
-        names.append(f"common turn about {direction_name(axis, decomposition)}{through}")
+        names.append(f"common rotation about {direction_name(axis, decomposition)}{through}")
     if len(names) < S.shape[1]:
         row = S[6] / (S[6] @ S[6])
         v = S[:3] @ row
         v = v - shifts @ (shifts.T @ v)
         fixed = "" if not anchored else f" about {point_text(centre - length * v)}"
-        names.append(f"scale{fixed}" + (" with a turn" if np.linalg.norm(S[3:6] @ row) > NAMED else ""))
+        names.append(f"scale{fixed}" + (" with a rotation" if np.linalg.norm(S[3:6] @ row) > NAMED else ""))
     return tuple(names)
 
 
 def _flexes(K: Array, trivial: Array, bodies: tuple[str, ...]) -> tuple[Flex, ...]:
-    """The unseen motions K (6 bodies, k) beyond the trivial ones, by the smallest sets of bodies that move while all
-    others rest."""
+    """Split the unobserved motions K (6 bodies, k) beyond the trivial ones into flexes of the smallest sets of links
+    that move while all others are fixed."""
     known, found = range_basis(trivial, 1.0)[0], list[Flex]()
     total, n = K.shape[1], len(bodies)
     for size in range(1, n + 1):
@@ -280,7 +282,7 @@ def _flexes(K: Array, trivial: Array, bodies: tuple[str, ...]) -> tuple[Flex, ..
                 links = tuple(bodies[i] for i in chosen)
                 of_kind = zip(("translation", "turn"), counts, strict=True) if size == 1 else [("motion", sum(counts))]
                 what = [f"{count} {kind}{'s' * (count > 1)}" for kind, count in of_kind if count]
-                how = "alone" if size == 1 else "while the others rest" if size < n else "against each other"
+                how = "alone" if size == 1 else "while the others are fixed" if size < n else "against each other"
                 found.append(Flex(links, sum(counts), f"{', '.join(links)} {how}: {', '.join(what)}"))
     return tuple(found)
 
@@ -293,7 +295,7 @@ def special_at(at: ClosedConfiguration, observation_model: ObservationModel) -> 
         return ""
     _, sizes, axes = np.linalg.svd(points - points.mean(axis=0))
     if sizes[1] <= NAMED * sizes[0]:
-        return "all points that are sensed lie on one line"
+        return "all observed points lie on one line"
     if len(points) > 3 and sizes[2] <= NAMED * sizes[0]:
-        return f"all points that are sensed lie in one plane, with the normal {point_text(orient_axis(axes[2]))}"
+        return f"all observed points lie in one plane, with the normal {point_text(orient_axis(axes[2]))}"
     return ""

@@ -1,4 +1,4 @@
-"""Freedoms of the platform in words: translations first, then rotations about lines the robot has, then screws."""
+"""Names of platform dof: translations first, then rotations about lines of the robot, then screws."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 class NotRecognised(Exception):
-    """The relations that were found do not describe the architecture: in what respect."""
+    """Error: the incidences that were found do not describe the architecture, with the reason."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,18 +56,20 @@ class Instance:
     twist: Numbers
     rates: tuple[Numbers, ...]
     links: Mapping[str, Numbers]
-    """The twists of all links for each joint's rates (6, rates)."""
+    """Return the twists of all links (6, rates) along a tree of joints, the loop constraints of the other joints on the
+    rates (rows, rates), and the rates of each joint."""
     free: Numbers
     """The basis of ker A (rates, mobility)."""
     loops: Numbers
-    """A: what the loops ask of the joints' rates (rows, rates)."""
+    """A: loop constraints on the joint rates (rows, rates)."""
     rows: tuple[Numbers, ...]
     """The twist and the rates for each joint's rates, before they are taken on ker A."""
     sightings: tuple[ViewGeometry | None, ...]
-    """Of each observation, where camera and link are; None of an encoder."""
+    """For each observation the frames of camera and link; None for an encoder."""
 
     def twists(self) -> dict[str, Numbers]:
-        """The twists of all links on the basis of ker A (6, mobility)."""
+        """Return the twists of all links (6, rates) along a tree of joints, the loop constraints of the other joints on
+        the rates (rows, rates), and the rates of each joint."""
         rows = np.vstack(list(self.links.values()))
         return dict(zip(self.links, _times(rows, self.free).reshape(-1, 6, self.mobility), strict=True))
 
@@ -103,8 +105,8 @@ def draw(relations: Incidences, rng: random.Random) -> Geometry:
 
 
 def ranks_at(relations: Incidences, place: int) -> tuple[int, ...]:
-    """The same ranks as those of ``Geometry``, in floating point, at one of the configurations of the relations; -1
-    where the singular values leave no gap."""
+    """Return the ranks of ``Geometry``, in floating point, at one of the configurations of the incidences; -1 if the
+    singular values have no gap."""
     directions = list(relations.directions[:, place])
     rows = [
         *(_direction_rows(conditions, directions) for conditions in relations.tower),
@@ -124,7 +126,7 @@ def instance(
 ) -> Instance:
     """The kinematics of a mechanism with this geometry, from the rates of its joints: whole numbers throughout.
 
-    The relations are those for the directions among the observations, and then for what the others rest on.
+    The incidences are those of the observed directions, then those of the other observations.
     """
     screws = {name: _screws(joint, relations, drawn) for name, joint in mechanism.joints.items()}
     velocities, loops, columns = _velocities(mechanism, screws)
@@ -152,7 +154,7 @@ def instance(
 
 
 def _screws(joint: Joint, relations: Incidences, drawn: Geometry) -> Numbers:
-    """The twists that a joint allows, each of any length, columns of whole numbers (6, freedoms)."""
+    """Twists that a joint allows, each of any length, columns of whole numbers (6, dof)."""
     from flint import fmpz
 
     number = relations.centres.get(joint.name)
@@ -169,8 +171,8 @@ def _screws(joint: Joint, relations: Incidences, drawn: Geometry) -> Numbers:
 def _velocities(
     mechanism: Mechanism, screws: Mapping[str, Numbers]
 ) -> tuple[dict[str, Numbers], Numbers, dict[str, slice]]:
-    """The twists of all links (6, rates) along a tree of joints, and what the other joints ask of the rates (rows,
-    rates): that their loops stay closed; the rates of each joint."""
+    """Return the twists of all links (6, rates) along a tree of joints, the loop constraints of the other joints on the
+    rates (rows, rates), and the rates of each joint."""
     joints = list(mechanism.joints.values())
     sizes = np.cumsum([0, *(screws[joint.name].shape[1] for joint in joints)])
     own = {joint.name: slice(*sizes[i : i + 2]) for i, joint in enumerate(joints)}
@@ -197,7 +199,7 @@ def _directions(relations: Incidences, rng: random.Random) -> tuple[tuple[Number
         basis = kernel(_direction_rows(conditions, found))
         if basis.shape[1] == 0:
             raise NotRecognised(
-                "no random direction fits all that is parallel, perpendicular or in one plane: "
+                "no random direction satisfies all incidences (parallel, perpendicular, in one plane): "
                 + relations.members(number)
             )
         found.append(_whole(basis @ random_numbers(basis.shape[1], rng)))
@@ -206,7 +208,7 @@ def _directions(relations: Incidences, rng: random.Random) -> tuple[tuple[Number
 
 
 def _direction_rows(conditions: Sequence[tuple[int, ...]], directions: Sequence[Numbers]) -> Numbers:
-    """What a direction is normal to (conditions, 3), of those before it."""
+    """Conditions (conditions, 3) on a direction by those before it."""
     rows = [directions[c[0]] if len(c) == 1 else cross(directions[c[0]], directions[c[1]]) for c in conditions]
     return np.array(rows, dtype=object).reshape(-1, 3)
 

@@ -1,15 +1,15 @@
-"""Which relations every motion keeps, to first order, at a random instance: what closed loops carry on.
+"""Incidences that every motion preserves, to first order, at a random instance: the loop-invariant ones.
 
-F is the irreducible family of geometries with all relations proposed (:mod:`.instances`), A(g) the constraints of a
-member g. Motions move the geometry by ġ = D(g) q̇. If ġ keeps all relations to first order for all q̇ ∈ ker A(g) at
-almost all g ∈ F, then D ker A is a field of tangent spaces of F, of constant dimension where the ranks are the generic
-ones, and the paths that follow it stay in F while all loops stay closed: from such a g the mechanism moves with
-dim ker A freedoms within F, and has no others. So relations that hold at one such configuration hold on the whole
-component of the configuration space, and T_qC = ker A there.
+F is the irreducible family of geometries with all proposed incidences (:mod:`.instances`), A(g) the constraints of a
+member g. Motions change the geometry by ġ = D(g) q̇. If ġ preserves all incidences to first order for all q̇ ∈ ker A(g)
+at almost all g ∈ F, then D ker A is a field of tangent spaces of F, of constant dimension where the ranks are the
+generic ones, and the paths that follow it stay in F while all loops stay closed. From such a g the mechanism moves with
+mobility dim ker A within F, and not otherwise. So incidences that hold at one such configuration hold on the whole
+branch, and T_qC = ker A there.
 
-That the first-order condition holds is a polynomial identity in the numbers of which an instance is made. It is tested
-at instances, in whole numbers: one that fails refutes it, one that passes is wrong with a chance of at most the
-identity's degree by the range of the numbers (Schwartz and Zippel), of which :func:`degree` is a bound.
+The first-order condition is a polynomial identity in the numbers of which an instance is made. It is tested at
+instances, in whole numbers: one that fails refutes it, one that passes is wrong with a probability of at most the
+identity's degree divided by the range of the numbers (Schwartz and Zippel), of which :func:`degree` is a bound.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from .instances import Instance
 
 
 def are_kept(every: Sequence[GeometricIncidence], relations: Incidences, found: Instance) -> list[bool]:
-    """Which of the relations all motions of an instance keep to first order."""
+    """Return the incidences that all motions of an instance preserve to first order."""
     moving = _Moving(relations, found)
     return [answer for _, group in groupby(every, key=_shape) for answer in moving.keeps(list(group))]
 

@@ -1,4 +1,5 @@
-"""What is measured of a robot, what it sees of the platform, and where it loses a freedom: watched legs or motors."""
+"""Measured values of a robot (observed legs or motors), their rank, and the condition under which a platform dof is
+unobserved."""
 
 from __future__ import annotations
 
@@ -20,7 +21,7 @@ from .verdict import Verdict, verdict_of
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MeasuredRobot(Value):
-    """A robot with samples for what is measured; verdict, pattern and condition are found when they are asked for."""
+    """Robot with samples of its measured values; verdict, pattern and condition are computed on demand."""
 
     setup: ObservedRobot
     samples: Samples
@@ -44,39 +45,39 @@ class MeasuredRobot(Value):
 
     @property
     def observation_model(self) -> ObservationModel:
-        """What is asked at each configuration."""
+        """Observation model that is evaluated at each configuration."""
         return self.samples.observation_model
 
     @property
     def rank(self) -> int:
-        """Freedoms of the platform that are seen at the best sample, whatever the gap."""
+        """Largest observed rank of the platform over the samples, whatever the gap."""
         return max(member.relation.rank for member in self.samples.members)
 
     @cached_property
     def verdict(self) -> Verdict:
-        """What is seen generically; raises ``RankUndecided``."""
+        """Generic verdict; raises ``RankUndecided``."""
         return verdict_of(self.setup, labels_of(self.observation_model.observations), self.samples)
 
     @cached_property
     def pattern(self) -> ConstraintPattern:
-        """The pattern of the legs with their measurements held, the same at all poses."""
+        """Pattern of the locked legs, the same at all poses."""
         return recognise(self.setup.decomposition, self.observation_model, self.setup.configurations)
 
     @cached_property
     def generic_pattern(self) -> ConstraintPattern:
-        """The same at generic poses: at special ones a held leg may leave its end more."""
+        """Pattern at generic poses: at special ones a locked leg may allow its end more."""
         if self.pattern.motion != "other":
             return self.pattern
         return recognise(self.setup.decomposition, self.observation_model, self.setup.configurations, everywhere=False)
 
     @cached_property
     def moving(self) -> tuple[str, Array | None]:
-        """How the platform, one body, moves with nothing held, and the normal where that is in a plane."""
+        """Motion of the platform, one link, with nothing locked, and the normal if that is in a plane."""
         return moving(self.setup.decomposition, self.observation_model, self.setup.configurations)
 
     @cached_property
     def condition(self) -> Condition:
-        """When a freedom is lost that is seen generically."""
+        """Condition under which a generically observed dof is unobserved."""
         return condition(self.pattern, self.observation_model)
 
     @cached_property

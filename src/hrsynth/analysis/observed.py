@@ -1,4 +1,4 @@
-"""What every question starts from: the robot in normal form, its legs, what is observed, and samples of its motion."""
+"""Setup of an analysis: the robot in normal form, its legs, its observations, and samples of its motion."""
 
 from __future__ import annotations
 
@@ -40,15 +40,15 @@ if TYPE_CHECKING:
     from ..batch.engine import Batch
 
 SAMPLES = 20
-"""Configurations of a certificate and of a generic verdict."""
+"""Number of samples of an equivalence check and of a generic verdict."""
 
 
-UNLIMITED = "joints whose limits are not looked at, as they are parts of other joints"
-"""What records say of ``unlimited``."""
+UNLIMITED = "joints whose limits are ignored because they are parts of composite joints"
+"""Description of ``limits_ignored`` in records."""
 LegsLike = Annotated[
     str | int | Iterable[str | int] | None,
     option(
-        "Legs to watch (1,4), links, or all (default: what the file observes, else all; none with --sensor).",
+        "Legs to observe (1,4), links, or all (default: what the file observes, else all; none with --sensor).",
         "LEGS",
         group=OBSERVATION,
     ),
@@ -58,28 +58,29 @@ LegsLike = Annotated[
 
 @dataclass(frozen=True)
 class Mobility(Record, all_recorded=True):
-    """Freedoms of a mechanism: all of them, and those that move neither the platform nor any default segment."""
+    """Mobility of a mechanism: total, and of internal motions, which move neither the platform nor any default
+    segment."""
 
     total: int
     internal: int
 
 
 class MobilityWritten(NamedTuple):
-    """Mobility in normal form, and that of the file's own links and joints."""
+    """Mobility in normal form and as the file describes the mechanism."""
 
     total: int
     internal: int
-    as_written: Annotated[Mobility | None, "null if the file's own mechanism could not be sampled"]
+    as_written: Annotated[Mobility | None, "null if the mechanism of the file could not be sampled"]
 
 
 class ObservedAxis(ObservationRecord):
-    """An observation, its axis in the frame of its link, and why it was chosen."""
+    """Observation, its axis in the frame of its link, and the reason for the choice."""
 
     reason: str
 
 
 class OperationModeRecord(NamedTuple):
-    """What the platform does in an operation mode."""
+    """Motion of the platform in an operation mode."""
 
     dof: int
     motion: str
@@ -87,7 +88,7 @@ class OperationModeRecord(NamedTuple):
 
 
 class OtherMode(NamedTuple):
-    """Another operation mode that was met, what legs see there, and a pose in it."""
+    """Another operation mode that was found, the observed rank there, and a pose in it."""
 
     dof: int
     motion: str
@@ -98,20 +99,40 @@ class OtherMode(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ObservedRobot(Value):
-    """A robot as read, its normal form and legs, the observations asked for, and samples in which all legs count."""
+    """Robot with observations; made by :func:`hrsynth.observe`, accepted by every analysis.
+
+    Parameters
+    ----------
+    robot
+        Mechanism as read.
+    normal
+        Its normal form.
+    decomposition
+        Its legs and platform.
+    observed
+        Observations.
+    all_samples
+        Samples with all default segments, the observations, and the segments that the file names.
+    defaults
+        Number of default segments among the observations of ``all_samples``; they come first.
+    form
+        Format of printed poses.
+    offered
+        Candidate observations, also among those of ``all_samples``.
+    """
 
     robot: Mechanism
     normal: NormalForm
     decomposition: LegDecomposition
     observed: Recorded[tuple[Observation, ...]]
     all_samples: Samples
-    """Samples for the question of all default segments, and besides of the observed ones and those the file names."""
+    """Samples with all default segments, the observations, and the segments that the file names."""
     defaults: int
-    """How many of the observations of ``everything`` are default segments; they come first."""
+    """Number of default segments among the observations of ``all_samples``; they come first."""
     form: PoseForm = RADIANS
-    """How poses are told."""
+    """Format of printed poses."""
     offered: tuple[Observation, ...] = ()
-    """What could be observed besides; among the observations of ``everything`` too."""
+    """Candidate observations; among the observations of ``all_samples`` too."""
 
     @classmethod
     def of(
@@ -127,18 +148,18 @@ class ObservedRobot(Value):
         driven: bool = False,
         blind: bool = False,
     ) -> ObservedRobot:
-        """What a question is asked of: an observed robot itself, or a robot with what is watched of it, as
-        :func:`.asked.observe`, and in the manner of ``sensor`` what is ``candidate_sensor``-ed besides. A question
-        about ``driven`` motors needs no segments: where there are none, the motors' coordinates are observed; where it
-        can be ``blind``, and there are none of either, nothing."""
+        """Return the setup of an analysis: an observed robot itself, or a robot with observations as for
+        :func:`.pose_requests.observe`, and ``candidate_sensor`` in the form of ``sensor``. Analyses of ``driven``
+        motors need no segments: without any, the motor coordinates are observed; with ``blind``, and neither of them,
+        nothing is."""
         robot = as_robot(robot)
         names = legs_asked(robot, observe, sensor)
         if isinstance(robot, ObservedRobot):
             if (observe, camera, sensor, candidate_sensor) != (None,) * 4:
                 raise BadRequest(
-                    f"{robot.headline()}: what is watched is given twice",
+                    f"{robot.headline()}: the observations are given twice",
                     observe or camera or sensor or candidate_sensor,
-                    "nothing besides an observed robot",
+                    remedy="Omit them: an observed robot already has its own.",
                 )
             return robot
         robot.require_platform()
@@ -161,7 +182,7 @@ class ObservedRobot(Value):
             raise
 
     def __eq__(self, other: object) -> bool:
-        """The same robot, watched in the same way, at the same samples."""
+        """Return the setup of the same robot with the same observations and samples."""
         if not isinstance(other, ObservedRobot):
             return NotImplemented
         return self is other or self._said() == other._said()
@@ -175,20 +196,20 @@ class ObservedRobot(Value):
 
     def headline(self) -> str:
         """The robot and the observed legs."""
-        return f"{self.robot.name}, watching {', '.join(self.labels)}"
+        return f"{self.robot.name}, observing {', '.join(self.labels)}"
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self.headline()}>"
 
     def by_segments(self, what: str) -> ObservedRobot:
-        """The same; raises ``BadRequest`` where something else is observed than directions of segments, seen from the
-        mechanism's reference link, which is all that ``what`` knows."""
+        """Return the setup; raises ``BadRequest`` if something other than directions of segments in the reference link
+        is observed, which is all that ``what`` supports."""
         for each in self.observed:
             if not each.by_segment:
                 raise BadRequest(
-                    f"{self.robot.name}: {what} knows directions of segments only",
+                    f"{self.robot.name}: {what} supports directions of segments only",
                     f"{each.kind} {each.leg}",
-                    "legs to watch by the directions of their segments",
+                    remedy="Observe legs by the directions of their segments.",
                 )
         return self
 
@@ -209,7 +230,7 @@ class ObservedRobot(Value):
 
     @property
     def all_legs(self) -> tuple[Observation, ...]:
-        """What all legs are watched at: their default segments, and the others of them that the file names."""
+        """Segments of all legs: the default ones, and others that the file names."""
         named = (o for o in self.mechanism.observations if o.by_segment and o.leg in self.decomposition.labels)
         return tuple({o.key: o for o in (*self.segments, *named)}.values())
 
@@ -220,11 +241,11 @@ class ObservedRobot(Value):
 
     @cached_property
     def motion(self) -> PlatformMotion:
-        """What the platform generically does."""
+        """Generic motion of the platform."""
         return replace(PlatformMotion.of(self.configurations, self.all_samples.observation_model), form=self.form)
 
     def telling(self, poses: Iterable[AskedPose]) -> ObservedRobot:
-        """The same, all that is known of it kept, which tells poses in the manner of these."""
+        """Return the setup, with all its computed values, that prints poses in the format of these."""
         form = PoseForm.of(poses)
         if form == self.form:
             return self
@@ -238,7 +259,7 @@ class ObservedRobot(Value):
         return restrict_samples(self.all_samples, self.observed)
 
     def beside(self) -> tuple[str, ...]:
-        """The other operation modes that were met: what the platform does in each, what legs see there, and where."""
+        """Other operation modes that were found: motion of the platform, observed rank, and a pose."""
         drawn = self.all_samples
         labels = [o.leg for o in drawn.observation_model.observations]
         return tuple(
@@ -260,7 +281,7 @@ class ObservedRobot(Value):
 
     @cached_property
     def placer(self) -> ConfigurationBuilder | None:
-        """What makes closed configurations of many platform poses; None where a leg is no known subproblem."""
+        """Builder of closed configurations for many platform poses; None unless every leg is a known subproblem."""
         from ..batch.configuration_builder import ConfigurationBuilder
 
         defaults = [o for o in self.segments if isinstance(o, Direction)]
@@ -272,15 +293,15 @@ class ObservedRobot(Value):
 
     @cached_property
     def mobility(self) -> Mobility:
-        """Mobility of the normal form, with its idle motions."""
+        """Mobility of the normal form, with its internal motions."""
         first, every = self.all_samples.members[0].relation, self.all_samples.observation_model.observations
         places = [every.index(each) for each in self.telling_idle]
         return Mobility(first.mobility, first.mobility - select_relation(first, places).dimension)
 
     @property
     def telling_idle(self) -> tuple[Observation, ...]:
-        """What an idle motion does not change: the default segments of all legs, and whatever else is observed that is
-        no segment."""
+        """Values that an internal motion does not change: the default segments of all legs, and other observations that
+        are no segments."""
         more = self.all_samples.observation_model.observations[self.defaults :]
         return *self.segments, *(each for each in more if not each.by_segment)
 
@@ -299,7 +320,7 @@ class ObservedRobot(Value):
 
     @property
     def mobility_if_written(self) -> Mobility | None:
-        """The same; None where no samples of the file's own mechanism can be drawn."""
+        """Mobility as the file describes the mechanism; None if no samples of it can be computed."""
         try:
             return self.mobility_as_written
         except HrsynthError:
@@ -312,11 +333,11 @@ class ObservedRobot(Value):
 
     @property
     def limits_ignored(self) -> tuple[str, ...]:
-        """Joints whose limits are not looked at, as the normal form joins them into others."""
+        """Joints whose limits are ignored, since the normal form joins them into others."""
         return tuple(name for name in self.robot.joint_ranges if name not in self.mechanism.stops)
 
     def measuring(self, observations: tuple[Observation, ...]) -> Samples:
-        """The samples' configurations again, with ρ for other observations (and no ways)."""
+        """Return the samples with ρ for other observations (and without paths)."""
         drawn = self.all_samples
         observation_model = replace(drawn.observation_model, observations=observations)
         members = tuple(Sample(at, (), relation(at, observation_model)) for at in self.configurations)
@@ -327,12 +348,12 @@ class ObservedRobot(Value):
     )
 
     def observed_axes(self) -> tuple[tuple[Observation, str], ...]:
-        """What is observed, and why it is that."""
+        """Observations, and the reasons for them."""
         return tuple((each, reason(self.decomposition, each)) for each in self.observed)
 
     @property
     def observed_record(self) -> list[ObservedAxis]:
-        """The same as JSON has it."""
+        """Observations as in JSON."""
         return [{**each.to_dict(), "reason": why} for each, why in self.observed_axes()]
 
     @property
@@ -343,7 +364,7 @@ class ObservedRobot(Value):
 
     @property
     def other_modes(self) -> list[OtherMode]:
-        """The other operation modes that were met."""
+        """Other operation modes that were found."""
         drawn = self.all_samples
         labels = [o.leg for o in drawn.observation_model.observations]
         return [
@@ -361,7 +382,7 @@ class ObservedRobot(Value):
 CameraLike = Annotated[
     str | Iterable[str] | None,
     option(
-        "The link that carries the camera; or a further camera with a name and its place on a link "
+        "The link that carries the camera; or a further camera with a name and its pose on a link "
         "(metres; radians or deg; focal length, width and height in pixels); repeat for more.",
         "LINK|NAME=LINK@x,y,z/r,p,y/f,w,h",
         kind=list[str],
@@ -404,9 +425,9 @@ NoiseLike = Annotated[
     ),
 ]
 Jobs = Annotated[int | None, option("Processes (default: one per core).", low=1)]
-"""What many questions are asked with."""
+"""Common options of analyses."""
 POSES = (
-    "or motors:0.1,0.2, or joints:NAME=0.3, or mode:2 of the list that modes gives; repeat for more "
+    "or motors:0.1,0.2, or joints:NAME=0.3, or mode:2 as listed by modes; repeat for more "
     "(default: the zero configuration)."
 )
 POINTS = (
@@ -425,9 +446,9 @@ def as_robot(given: RobotLike) -> Mechanism | ObservedRobot:
     if isinstance(given, str | os.PathLike):
         return load(given)
     raise BadRequest(
-        "a robot",
+        "robot",
         given,
-        "what hrsynth.load or hrsynth.observe gives, the path of a robot file, the name "
+        "a result of hrsynth.load or hrsynth.observe, the path of a robot file, the name "
         "of a shipped robot, example:NAME",
     )
 
@@ -440,7 +461,7 @@ def as_names(given: LegsLike) -> tuple[str, ...] | None:
     every = sorted(every, key=str) if isinstance(every, set | frozenset) else list(every)
     if not all(isinstance(each, str | Integral) and not isinstance(each, bool) for each in every):
         raise BadRequest(
-            "legs to watch",
+            "--observe",
             given,
             "a label or a link such as 1 or 'rod_1a', several in a list or in a text with commas, or 'all'",
         )
@@ -448,7 +469,7 @@ def as_names(given: LegsLike) -> tuple[str, ...] | None:
 
 
 def legs_asked(robot: Mechanism | ObservedRobot, observe: LegsLike, sensor: SeeLike = None) -> tuple[str, ...] | None:
-    """:func:`as_names`, None also for all legs where nothing but segments is watched: one question, told in one way."""
+    """Return :func:`as_names`, but None for all legs if only segments are observed: the same request in one form."""
     names = as_names(observe)
     other = sensor is not None or (isinstance(robot, Mechanism) and bool(robot.observations))
     return None if names == ("all",) and not other else names
@@ -464,12 +485,12 @@ def as_texts(given: str | Iterable[str] | None) -> tuple[str, ...]:
         else (given,)
     )
     if not all(isinstance(each, str) for each in every):
-        raise BadRequest("cameras and what they see", given, f"texts such as {SEE}, or {CAMERA}")
+        raise BadRequest("--camera, --sensor", given, f"texts such as {SEE}, or {CAMERA}")
     return every
 
 
 def forget_robots() -> None:
-    """Forget the samples that are remembered."""
+    """Clear the cached samples."""
     _observed_robot.cache_clear()
 
 
@@ -486,8 +507,7 @@ def _observed_robot(
     driven: bool,
     blind: bool,
 ) -> ObservedRobot:
-    """The answer to the same words for the same value of a robot, of one ``source``, is the same value: it is drawn
-    once."""
+    """Return the same value for equal arguments and an equal robot from one ``source``: samples are computed once."""
     robot, asked, possible = _seeing(robot, cameras, sensor, candidate_sensor)
     normal = normal_form(robot)
     decomposition = decompose(normal.mechanism)
@@ -510,7 +530,7 @@ def _observed_robot(
     observed = (*chosen, *(o for o in decomposition.mechanism.observations if o.leg in asked))
     offered = tuple(o for o in decomposition.mechanism.observations if o.leg in possible)
     known = {o.key for o in defaults.values()}
-    named = tuple(o for o in own if o.by_segment)  # of legs that are not asked for too: another set may hold them
+    named = tuple(o for o in own if o.by_segment)  # of legs that are not requested too: another set may contain them
     extra = tuple({o.key: o for o in (*observed, *offered, *named) if o.key not in known}.values())
     first, *others = normal.mechanism.bodies
     observation_model = ObservationModel(
@@ -527,14 +547,17 @@ def _observed_robot(
 def _seeing(
     robot: Mechanism, cameras: tuple[str, ...], sensor: tuple[str, ...], candidate_sensor: tuple[str, ...]
 ) -> tuple[Mechanism, set[str], set[str]]:
-    """The robot with cameras and observations that are asked for and offered, and the labels of these."""
+    """Add the requested and candidate cameras and observations to a robot; also return their labels."""
     named = [parse_camera(text) for text in cameras if "=" in text]
     links = [text for text in cameras if "=" not in text]
     if len(links) > 1:
-        raise BadRequest("--camera: links that carry the camera", ", ".join(links), "one; others as NAME=LINK@x,y,z")
+        raise BadRequest(
+            f"--camera {', '.join(links)}: several links carry the camera",
+            remedy="Name one; give others as NAME=LINK@x,y,z.",
+        )
     for link in links:
         if link not in robot.links:
-            raise BadRequest(f"{robot.name} has no link for the camera", link, sorted(robot.links))
+            raise BadRequest(f"--camera: link of {robot.name}", link, sorted(robot.links))
         robot = replace(robot, camera=link)
     eyes = [each.name for each in named or robot.cameras]
     every = [("--sensor", text) for text in sensor] + [("--candidate-sensor", text) for text in candidate_sensor]
@@ -543,10 +566,8 @@ def _seeing(
     for camera in named:
         if camera.name not in used and (used or not specs):  # an inclination or an encoder alone needs none
             raise BadRequest(
-                f"{robot.name}: a camera to which nothing is given to see",
-                camera.name,
-                f"--sensor {camera.name}=KIND:LINK… with it, where a command has that option; --camera LINK "
-                "for the camera that watches legs",
+                f"--camera {camera.name}: no observation uses this camera of {robot.name}",
+                remedy=f"Add --sensor {camera.name}=KIND:LINK…, or use --camera LINK for a camera that observes legs.",
             )
     robot = with_sights(robot, (), named)
     labels: list[set[str]] = [{o.leg for o in robot.observations}]
@@ -554,7 +575,9 @@ def _seeing(
         try:
             robot = with_sights(robot, [spec])
         except BadRequest as error:
-            raise BadRequest(f"{flag} {text}: {error.problem}", error.got, error.expected) from None
+            raise BadRequest(
+                f"{flag} {text}: {error.problem}", error.got, error.expected, remedy=error.remedy
+            ) from None
         labels.append({o.leg for o in robot.observations}.difference(*labels))
     return robot, set().union(*labels[1 : len(sensor) + 1]), set().union(*labels[len(sensor) + 1 :])
 
@@ -563,7 +586,9 @@ def _spec(option: str, text: str, eyes: Sequence[str]) -> ObservationSpec:
     try:
         return parse_see(text, eyes)
     except BadRequest as error:
-        raise BadRequest(error.problem.replace("--sensor", option, 1), error.got, error.expected) from None
+        raise BadRequest(
+            error.problem.replace("--sensor", option, 1), error.got, error.expected, remedy=error.remedy
+        ) from None
 
 
 def _observations(
@@ -574,7 +599,7 @@ def _observations(
     given_too: Sequence[Observation],
 ) -> tuple[Observation, ...]:
     if observe is not None and not observe:
-        raise BadRequest("nothing is observed", "no leg", "leg labels, links, or all")
+        raise BadRequest("--observe: nothing is observed", remedy="Give leg labels, links, or all.")
     if observe is None or list(observe) == ["all"]:
         for leg in decomposition.legs:
             if leg.label not in defaults:
@@ -596,12 +621,14 @@ def _observations(
         elif name in normal.into:
             link = normal.into[name]
             if link not in decomposition.mechanism.links:
-                raise BadRequest(f"link {name!r} acts inside a joint and has no direction of its own")
+                raise BadRequest(
+                    f"--observe {name}: the link is part of a joint and has no direction", remedy="Name another link."
+                )
             given = next((o for o in decomposition.mechanism.observations if o.link == link and o.by_segment), None)
             observation = given or observation_of(decomposition, link)
         else:
             raise BadRequest(
-                f"{decomposition.mechanism.name} has no leg or link",
+                f"--observe: leg or link of {decomposition.mechanism.name}",
                 name,
                 "legs "
                 + ", ".join([*decomposition.labels, *labels_of(given_too)])
@@ -613,7 +640,7 @@ def _observations(
 
 
 def motors(setup: ObservedRobot) -> ObservationModel:
-    """The question that a robot's own motors answer: their coordinates, as encoders would give them."""
+    """Return the observation model of the robot's motors: their coordinates, as encoders measure them."""
     return replace(setup.all_samples.observation_model, observations=_encoders_of(setup.decomposition))
 
 
@@ -626,7 +653,8 @@ def _encoders_of(decomposition: LegDecomposition) -> tuple[Observation, ...]:
 
 
 def restrict_samples(samples: Samples, observations: Iterable[Observation], *, ways: bool = True) -> Samples:
-    """The same samples for fewer observations (all of them among the samples' own), with their ``ways`` or without."""
+    """Return the samples for fewer observations (all of them among the samples' own), with or without their
+    ``ways``."""
     wanted = tuple(observations)
     all_of = samples.observation_model.observations
     keys = [o.key for o in all_of]

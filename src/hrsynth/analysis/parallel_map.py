@@ -1,4 +1,4 @@
-"""One question over many robots, legs and poses, in several processes."""
+"""One analysis over many robots, legs and poses, in several processes."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from ..results import Result, brief
 from .observed import LegsLike, RobotLike, as_names, as_robot
 
 PARTS_EACH = 2
-"""Parts of the work for each process, at least, where there are so many questions."""
+"""Minimum number of work items per process, if there are so many."""
 RAISE, KEEP = "raise", "keep"
-"""What becomes of a question that cannot be answered: it ends all, or its error takes the place of the answer."""
+"""Handling of an analysis that fails: raise its error, or keep it in place of the result."""
 
 Given = dict[str, Any]
-"""The arguments of one question."""
+"""Arguments of one analysis."""
 
 
 def map_robots(
@@ -37,25 +37,48 @@ def map_robots(
     errors: str = RAISE,
     **options: Any,
 ) -> list[Any]:
-    """The answers to one question about each of the ``robots``, with each of the sets of ``legs``, at each of the
-    ``poses``: in this order, poses fastest, whichever is finished first.
+    """Results of one analysis for each of the robots, each set of legs and each pose, computed in parallel.
 
-    ``question`` is a public function or its name, or your own function with the same parameters: it gets a pose as
-    ``at``, or as ``goal`` if it has no ``at``, and a set of legs as ``observe``; ``options`` are the same for all.
-    There are ``jobs`` processes, by default one per core; with 1 everything is done in this process. A robot's samples
-    are drawn once in each process that is asked about it. ``errors`` is ``raise``, or ``keep``: an error of a question,
-    or of reading its robot (an ``HrsynthError``), then takes the place of the answer. The error says what was asked.
+    Parameters
+    ----------
+    observation_model
+        Public function or its name, or your own function with the same parameters. It receives a pose as ``at``, or as
+        ``goal`` without ``at``, and a set of legs as ``observe``.
+    robots
+        Robots, as for the function.
+    poses, legs
+        Poses and sets of legs; default: none is passed.
+    jobs
+        Number of processes; default: one per core. With 1 all is computed in this process.
+    errors
+        ``raise``, or ``keep``: an ``HrsynthError`` then takes the place of the result.
+    options
+        Further options, the same for all.
 
-    Raises ``BadRequest``, and what the question raises.
+    Returns
+    -------
+    list
+        Results, ordered by robot, then legs, then pose (fastest).
 
+    Raises
+    ------
+    BadRequest
+        For invalid arguments; and what the analysis raises.
+
+    Notes
+    -----
+    The samples of a robot are computed once in each process. Errors contain the request.
+
+    Examples
+    --------
     >>> hrsynth.map_robots("check", ["3rrr_m1"], poses=["x=0,phi=0", "x=0.01,phi=0"], legs=["1,2", "all"], jobs=1)[0]
-    <Check: 3rrr_m1, watching 1, 2: x=0,y=0,z=0,phi=0deg regular, shows 2 of 3>
+    <Check: 3rrr_m1, observing 1, 2: x=0,y=0,z=0,phi=0deg regular, observes 2 of 3 dof>
     """
     function: Callable[..., Any] = _function(observation_model)
     if errors not in (RAISE, KEEP):
         raise BadRequest("errors", errors, (RAISE, KEEP))
     if jobs is not None and (isinstance(jobs, bool) or not isinstance(jobs, int) or jobs < 1):
-        raise BadRequest("number of processes", jobs, "1 or more")
+        raise BadRequest("--jobs", jobs, "1 or more")
     several: Any = [robots] if isinstance(robots, str | os.PathLike) or not isinstance(robots, Iterable) else robots
     every = [_read(each, errors) for each in several]
     sets = [legs] if isinstance(legs, str) else legs
@@ -78,7 +101,7 @@ def map_robots(
 
 
 def _read(given: RobotLike, errors: str) -> RobotLike:
-    """The robot, read once; where errors are kept, one that cannot be read as it was given."""
+    """Read the robot once; if errors are kept, return one that cannot be read as it was given."""
     try:
         return as_robot(given)
     except HrsynthError:
@@ -96,19 +119,19 @@ def _function(observation_model: str | Callable[..., Any]) -> Callable[..., Any]
         found = None
     if not (callable(found) and "robot" in signature(found).parameters):
         raise BadRequest(
-            "a question", observation_model, "a function of hrsynth that takes a robot, or its name, such as check"
+            "analysis", observation_model, "a function of hrsynth that takes a robot, or its name, such as check"
         )
     return found
 
 
 def _answer_part(function: Callable[..., Any], errors: str, part: list[Given]) -> list[Any]:
-    """The answers of a part, to its first error where that ends all; the error is told what was asked."""
+    """Results of a part, up to its first error if that ends all; the request is added to the error."""
     found: list[Any] = []
     for given in part:
         try:
             found.append(function(**{**given, "robot": as_robot(given["robot"])}))
         except Exception as error:
-            error.add_note("asked: " + ", ".join(f"{name} {_describe(value)}" for name, value in given.items()))
+            error.add_note("request: " + ", ".join(f"{name} {_describe(value)}" for name, value in given.items()))
             if not isinstance(error, HrsynthError):
                 raise
             found.append(error)
@@ -127,4 +150,4 @@ def _place(function: Callable[..., Any]) -> str:
     for name in ("at", "goal"):
         if name in known:
             return name
-    raise BadRequest(f"poses for {function.__name__}", "no parameter for a pose", "a question with at or goal")
+    raise BadRequest(f"{function.__name__} has no parameter for a pose", remedy="Use an analysis with at or goal.")

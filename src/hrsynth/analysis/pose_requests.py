@@ -1,5 +1,5 @@
-"""The configurations of the poses that a question names: by parts of the pose, by coordinates of joints, or by the
-number of a mode."""
+"""Configurations of requested poses: by parts of the pose, by joint coordinates, or by the number of an assembly
+mode."""
 
 from __future__ import annotations
 
@@ -34,23 +34,47 @@ def observe(
     samples: int = SAMPLES,
     seed: int = 0,
 ) -> ObservedRobot:
-    """A robot with what is watched of it, its normal form and samples of its motion: the starting point of every
-    question.
+    """Robot with observations, its normal form and samples of its motion: the starting point of every analysis.
 
-    ``legs`` holds leg labels or link names (in a string, separated by commas); ``["all"]`` means all legs, None
-    what the robot itself observes, else all legs at their default segments. ``camera`` names the link that carries
-    the camera; ``NAME=LINK@x,y,z/r,p,y`` is a further, named one, in the link's frame (x right, y down, z ahead;
-    metres, radians or ``deg``). ``sensor`` holds other observations, ``[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius``
-    (:mod:`hrsynth.mechanism.observations`), which replace all legs if ``legs`` is None. ``at`` is a pose that
-    replaces the zero configuration: on the same branch if that reaches the pose, otherwise in another operation
-    mode that was met; coordinates of joints or motors (``motors:0.1,0.2``); or a mode of the zero configuration with
-    what is watched, ``mode:2``, at which ``modes`` found the robot assembled.
+    Parameters
+    ----------
+    robot
+        Mechanism, path of a file, name of a shipped robot, or ``example:NAME``.
+    legs
+        Leg labels or link names (a list, or text with commas); ``["all"]``: all legs; None: what the file observes,
+        else all legs at their default segments.
+    camera
+        Link that carries the camera; ``NAME=LINK@x,y,z/r,p,y`` is a named one in the link frame (x right, y down, z
+        ahead; m, rad or ``deg``).
+    sensor
+        Other observations, ``[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius`` (:mod:`hrsynth.mechanism.observations`), which
+        replace all legs if ``legs`` is None.
+    at
+        Pose that replaces the zero configuration: on the same branch if possible, else in another operation mode that
+        was found; coordinates of motors or joints (``motors:0.1,0.2``); or ``mode:2``, an assembly mode at which
+        ``modes`` found the robot assembled.
+    samples
+        Number of samples.
+    seed
+        Seed of the random configurations.
 
-    Raises ``BadRequest`` for unknown labels, links, parts of a pose and modes, ``PoseNotReached``.
+    Returns
+    -------
+    ObservedRobot
+        Robot that every analysis accepts.
 
+    Raises
+    ------
+    BadRequest
+        For unknown labels, links, parts of a pose and modes.
+    PoseNotReached
+        If the pose is not reached.
+
+    Examples
+    --------
     >>> robot = hrsynth.observe("3rrr_m1", [1, 2])
     >>> robot
-    <ObservedRobot: 3rrr_m1, watching 1, 2>
+    <ObservedRobot: 3rrr_m1, observing 1, 2>
     >>> hrsynth.derive(robot).verdict == "controllable"
     False
     """
@@ -60,7 +84,9 @@ def observe(
         return ObservedRobot.of(robot, legs, camera, sensor=sensor, samples=samples, seed=seed)
     if isinstance(robot, ObservedRobot):
         raise BadRequest(
-            f"{robot.headline()}: what is watched is given twice", str(at), "nothing besides an observed robot"
+            f"{robot.headline()}: the observations are given twice",
+            str(at),
+            remedy="Omit them: an observed robot already has its own.",
         )
     require_platform(robot, at)
     asked = asked_pose(at)
@@ -74,13 +100,12 @@ def observe(
 
 
 def require_platform(robot: Mechanism, where: object) -> None:
-    """Refuses the pose or grid ``where`` of a formation: it would be that of its first body, the others staying."""
+    """Raise ``BadRequest`` for a pose or grid ``where`` of a formation: it would be that of its first link, the others
+    staying."""
     if robot.formation:
         raise BadRequest(
-            f"{robot.name}: a pose belongs to one platform, and this is a formation",
-            str(where),
-            f"nothing: {', '.join(robot.bodies)} stand where the file has them (--platform LINK makes one "
-            "the platform)",
+            f"--at {where}: {robot.name} is a formation ({', '.join(robot.bodies)}), without one platform",
+            remedy="Omit it, or choose a platform with --platform LINK.",
         )
 
 
@@ -100,7 +125,11 @@ def _start_at(setup: ObservedRobot, wanted: Pose) -> ClosedConfiguration:
 def configurations_at(
     setup: ObservedRobot, poses: Sequence[AskedPose], by_modes: bool = False
 ) -> list[ClosedConfiguration]:
-    """The robot at each of the poses, as :func:`asked_at`; raises ``PoseNotReached`` for the first not reached."""
+    """Return the robot at each of the poses, or the error why it does not get there. ``mode:3`` is the third assembly
+    mode of the first pose among these that is given by its parts (without one, of the zero configuration), as ``modes``
+    lists them; with ``by_modes`` of the first that is reached, and a pose that small steps do not reach is then
+    searched among its modes. Raises ``BadRequest`` for parts of a pose that the platform cannot change and for modes
+    that do not exist."""
     found = asked_at(setup, poses, by_modes)
     for each in found:
         if isinstance(each, PoseNotReached):
@@ -111,13 +140,11 @@ def configurations_at(
 def asked_at(
     setup: ObservedRobot, poses: Sequence[AskedPose], by_modes: bool = False
 ) -> list[ClosedConfiguration | PoseNotReached]:
-    """The robot at each of the poses, or why it does not get there. ``mode:3`` is the third mode, with the directions
-    that are watched, of the first pose among these that is given by its parts (of the zero configuration where none
-    is), as ``modes`` lists them; with ``by_modes`` of the first that is reached, and a pose to which no small steps
-    lead is that of such a mode, where one is there.
-
-    Raises ``BadRequest`` for parts of a pose that the platform cannot change and for modes that there are not.
-    """
+    """Return the robot at each of the poses, or the error why it does not get there. ``mode:3`` is the third assembly
+    mode of the first pose among these that is given by its parts (without one, of the zero configuration), as ``modes``
+    lists them; with ``by_modes`` of the first that is reached, and a pose that small steps do not reach is then
+    searched among its modes. Raises ``BadRequest`` for parts of a pose that the platform cannot change and for modes
+    that do not exist."""
     if not poses:
         return []
     require_platform(setup.robot, poses[0])
@@ -136,7 +163,7 @@ def asked_at(
     about = next(iter(reached if by_modes else found.values()), all_samples.start)
     unreached = {each: at for each, at in found.items() if isinstance(at, PoseNotReached) and isinstance(each, Pose)}
     if isinstance(about, PoseNotReached):
-        reason = f"it would be a mode at {about.pose}, which is not reached"
+        reason = f"it is an assembly mode of {about.pose}, which is not reached"
         return [
             found.get(each) or PoseNotReached(about.robot, str(each), 0.0, about.last, reason=reason) for each in poses
         ]

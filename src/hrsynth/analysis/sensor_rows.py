@@ -28,14 +28,14 @@ Place = tuple[str, tuple[float, ...]]
 
 @dataclass(frozen=True, eq=False)
 class SensorPlaces:
-    """The points and directions, fixed in links, on which observations rest besides joints: every one once."""
+    """Points and directions, fixed in links, on which observations depend besides joints, each once."""
 
     points: tuple[Place, ...]
     directions: tuple[Place, ...]
 
     @classmethod
     def of(cls, observations: Sequence[Observation], mechanism: Mechanism) -> SensorPlaces:
-        """Those of some observations."""
+        """Return those of some observations."""
         points: dict[Place, None] = {}
         directions: dict[Place, None] = {}
         for each in observations:
@@ -46,12 +46,12 @@ class SensorPlaces:
         return cls(tuple(points), tuple(directions))
 
     def as_observed(self) -> list[Direction]:
-        """The directions as if each was observed: that is how relations find what they are parallel to."""
+        """Return the directions as if each were observed: so incidences find parallel ones."""
         return [Direction("", link, np.array(axis)) for link, axis in self.directions]
 
 
 def has_exact_rates(seen: Observation) -> bool:
-    """Whether an observation has exact rates: all but a single edge of a cylinder, whose plane is irrational."""
+    """Return True if an observation has exact rates: all but a single edge of a cylinder, whose plane is irrational."""
     return isinstance(seen, SeenAxis | Encoder) or (isinstance(seen, CameraObservation) and seen.rational)
 
 
@@ -64,8 +64,8 @@ def sighting(
     mechanism: Mechanism,
     direction: Numbers | None,
 ) -> ViewGeometry | None:
-    """Where camera and link of an observation are at a rational instance; ``centres`` are rational, the ``sights`` the
-    directions of ``places``, ``direction`` is that of an observed axis. None of an encoder."""
+    """Frames of camera and link of an observation at a rational instance; ``centres`` are rational, the ``sights`` the
+    directions of ``places``, ``direction`` is that of an observed axis. None for an encoder."""
     from flint import fmpq
 
     nothing = np.array([fmpq(0)] * 3, dtype=object)
@@ -108,7 +108,7 @@ def _whole(wrench: Numbers) -> Numbers:
 
 
 def _coordinate(seen: Encoder, mechanism: Mechanism) -> int:
-    """The number of an encoder's coordinate among those of its joint, as its twists are told."""
+    """Return the index of an encoder's coordinate among those of its joint."""
     joint = mechanism.joints[seen.joint]
     if joint.type == "U":
         return int(seen.link != joint.successor)

@@ -42,7 +42,7 @@ def generic(counts: Sequence[Counts]) -> Counts:
 
 
 def gap_of(found: VelocityRelation) -> float:
-    """The smallest gap of all ranks that the counts rest on."""
+    """Smallest rank gap of the indices."""
     return min(found.gap, found.dof.gap, found.RO.gap, range_basis(found.rates, 1.0)[1].gap)
 
 
@@ -76,12 +76,12 @@ class SingularityIndices(Record, all_recorded=True):
 
     @property
     def type1(self) -> bool:
-        """What is measured moves while the platform rests (RI > 0)."""
+        """Measured values change while the platform is fixed (RI > 0)."""
         return self.RI > 0
 
     @property
     def type2(self) -> bool:
-        """The platform moves while what is measured rests (RO > 0)."""
+        """The platform moves while the measured values are constant (RO > 0)."""
         return self.RO > 0
 
     @property
@@ -100,8 +100,8 @@ def interaction_matrix(found: VelocityRelation) -> Array | None:
 
 @dataclass(frozen=True)
 class Redundancy(Record, all_recorded=True):
-    """``rows`` constraints of the loop that the file calls ``loop`` repeat what earlier loops say already; at
-    generic configurations where ``generic``."""
+    """Redundant equations of a loop, which depend on those of earlier loops. There are ``rows`` of the loop ``loop``,
+    at generic configurations if ``generic``."""
 
     loop: str
     rows: int
@@ -109,7 +109,7 @@ class Redundancy(Record, all_recorded=True):
 
 
 Rows = tuple[tuple[str, int], ...]
-"""Each loop's name with its number of redundant rows, in the order of the twin's loops."""
+"""Name of each loop with its number of redundant rows, in the order of the model's loops."""
 
 
 def redundant_rows(at: ClosedConfiguration) -> Rows:

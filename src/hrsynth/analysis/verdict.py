@@ -1,4 +1,4 @@
-"""What one set of observed legs sees of the platform (docs/pages/theory.md, section 6)."""
+"""Verdict on one set of observed legs (docs/pages/theory.md, section 6)."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from .observed import ObservedRobot
 
 CONTROLLABLE, PARTIAL, BLIND = "controllable", "partially controllable", "uncontrollable"
 AT_REST = "nothing to control"
-"""Of a platform that does not move, whatever its legs do."""
+"""Verdict on a platform that does not move."""
 ELSEWHERE = "with the platform at"
-"""What the name of a lost freedom has where the zero configuration is not a generic one."""
+"""Suffix of an unobserved dof's name if the zero configuration is not generic."""
 
 
 def word(rank: int, dof: int) -> str:
-    """The verdict where ``rank`` of the platform's ``dof`` freedoms are seen."""
+    """Return the verdict for ``rank`` of ``dof`` observed platform dof."""
     if not dof:
         return AT_REST
     return CONTROLLABLE if rank == dof else PARTIAL if rank else BLIND
 
 
 class Margin(NamedTuple):
-    """The smallest singular value that counts, the largest that does not, and where the cut is."""
+    """Smallest singular value that counts, largest that does not, and the cutoff."""
 
     smallest_kept: float
     largest_dropped: float
@@ -41,7 +41,7 @@ class Margin(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Verdict(Result, shown_as="verdict"):
-    """What one set of observed legs sees of the platform, at generic configurations."""
+    """Verdict on one set of observed legs, at generic configurations."""
 
     legs: Recorded[tuple[str, ...]]
     verdict: Annotated[str, Word]
@@ -50,36 +50,34 @@ class Verdict(Result, shown_as="verdict"):
     unobserved: Recorded[tuple[Freedom, ...]]
     gap: Annotated[float, GAP]
     has_interaction_matrix: Recorded[bool] = True
-    """Whether Mᵀ exists: no observed direction moves while the platform rests."""
+    """True if Mᵀ exists: no observed direction changes while the platform is fixed."""
     smallest_kept: float = 1.0
-    """The smallest singular value of the measured rates on ρ that counts as seen, at the sample where it is largest:
-    single samples may lie near a singularity, whatever the dimensions."""
+    """Smallest singular value that counts of the measured rates on ρ, at the sample where it is largest: single samples
+    may lie near a singularity."""
     largest_dropped: float = 0.0
     """The largest that does not, at the sample where it is least."""
     formation: Annotated[Formation | None, Formation, OPTIONAL] = None
-    """Of a formation: what is not seen, trivial motions and flexes; ``dof`` are the freedoms of all bodies."""
-    rank_at_zero: Annotated[
-        int | None, int, OPTIONAL, "at a zero configuration that shows fewer freedoms than others do"
-    ] = None
-    """How many freedoms the zero configuration shows, where these are fewer than elsewhere (it is singular); None
-    where they are as many, the number is not decided, or several bodies are asked of."""
+    """For a formation: unobserved motions, trivial ones and flexes; ``dof`` are those of all links."""
+    rank_at_zero: Annotated[int | None, int, OPTIONAL, "at a zero configuration with a lower rank than others"] = None
+    """Rank at the zero configuration if it is lower than elsewhere (it is singular); None if it is equal, not decided,
+    or for several platform links."""
 
     @property
     def near(self) -> bool:
-        """Whether a singular value lies so near to the cutoff that slightly other geometry has another verdict."""
+        """True if a singular value is so near the cutoff that slightly different geometry has another verdict."""
         return (self.rank > 0 and self.smallest_kept < SURELY_SOMETHING) or self.largest_dropped > SURELY_ZERO
 
     @property
     def named(self) -> str:
-        """The lost freedoms, and where they have these names: at other configurations others are lost."""
+        """Unobserved dof, and the configuration at which they have these names: at others they differ."""
         names = "; ".join(each.name for each in self.unobserved)
         return names if ELSEWHERE in names else f"{names} (at the zero configuration)"
 
     @property
     def never(self) -> str:
-        """How many freedoms are lost at all configurations, and which at one of them."""
+        """Number of dof that are unobserved at all configurations, and their names at one of them."""
         count = len(self.unobserved)
-        return f"{count} of {self.dof} freedoms {'is' if count == 1 else 'are'} never seen: {self.named}"
+        return f"{count} of {self.dof} dof never observed: {self.named}"
 
     def headline(self) -> str:
         """The legs, the verdict and the rank."""
@@ -90,7 +88,7 @@ class Verdict(Result, shown_as="verdict"):
     @property
     @recorded()
     def margin(self) -> Margin:
-        """The smallest singular value that counts, the largest that does not, and where the cut is."""
+        """Smallest singular value that counts, largest that does not, and the cutoff."""
         return Margin(self.smallest_kept, self.largest_dropped, RANK_CUTOFF)
 
 
@@ -103,7 +101,7 @@ def verdict_of(setup: ObservedRobot, legs: Sequence[str], samples: Samples) -> V
     found = [member.relation for member in samples.members]
     look(found)
     rank = max(each.rank for each in found)
-    what = f"what legs {', '.join(legs)} see"
+    what = f"the rank of legs {', '.join(legs)}"
     if any(each.rank != rank for each in found):
         between = min(each.seen.weakest for each in found) / max(each.seen.dropped for each in found)
         raise RankUndecided(f"{what} is not the same at all configurations", between, RANK_GAP)
@@ -136,8 +134,8 @@ def verdict_of(setup: ObservedRobot, legs: Sequence[str], samples: Samples) -> V
 
 
 def _formation(setup: ObservedRobot, samples: Samples, start: VelocityRelation, count: int) -> Formation:
-    """What is not seen of a formation, at the zero configuration (ρ there: ``start``) where it is as at a sample, else
-    there."""
+    """Return the unobserved motions of a formation, at the zero configuration (ρ there: ``start``) if it is generic,
+    else at a sample."""
     member = samples.members[0]
     usual = formation_at(member.configuration, samples.observation_model, member.relation, setup.decomposition)
     if start.unobserved_twists.shape[1] != count or start.gap < RANK_GAP:
@@ -149,7 +147,7 @@ def _formation(setup: ObservedRobot, samples: Samples, start: VelocityRelation, 
 def _lost_freedoms(
     setup: ObservedRobot, samples: Samples, start: VelocityRelation, legs: tuple[str, ...], count: int
 ) -> tuple[Freedom, ...]:
-    """The lost freedoms at the zero configuration (ρ there: ``start``) where it is generic, else at a sample."""
+    """Return the unobserved dof at the zero configuration (ρ there: ``start``) if it is generic, else at a sample."""
     position = None
     found = start.unobserved_twists
     if found.shape[1] != count or start.gap < RANK_GAP:

@@ -1,9 +1,9 @@
-"""Closed Type 2 conditions of a platform of six freedoms that six independent wrenches hold, by what holds it.
+"""Closed Type 2 conditions of a platform of six dof under six independent wrenches, by kind of constraint.
 
-A *ray* lets a tip B move along a line r: an image point, a leg whose direction is watched. A *plane* lets B move in a
-plane of normal n, and the body turn about the normals of an axis e: a line in the image. An *axis* u lets the body turn
-about it alone: a direction, an inclination. Each condition is the determinant of the wrenches, up to a constant
-(docs/pages/proofs.md has the derivations).
+A *ray* lets a tip B move along a line r: an image point, a leg whose direction is observed. A *plane* lets B move
+in a plane of normal n, and the platform rotate about the normals of an axis e: a line in the image. An *axis* u lets
+the platform rotate about it alone: a direction, an inclination. Each condition is the determinant of the wrenches,
+up to a constant (docs/pages/proofs.md has the derivations).
 """
 
 from __future__ import annotations
@@ -92,7 +92,9 @@ def _three_planes(*planes: LockedLeg) -> ClosedForm:
     else:
         meet = f"the planes of {eye} and the lines ({n}) have a line in common: the images of the lines meet in a point"
     feet = f"the perpendiculars from the cameras to their lines ({e}) are parallel to one plane"
-    feet = feet if eye is None else f"{eye} and the feet of its perpendiculars on the lines ({e}) lie in one plane"
+    feet = (
+        feet if eye is None else f"{eye} and the footpoints of its perpendiculars on the lines ({e}) lie in one plane"
+    )
     fixed = eye is not None and all(isinstance(leg.normal, CrossProduct) for leg in planes)
     more = f"; {eye} is on the ruled quadric of the lines that meet {lines}" if fixed else ""
     both = det(*normals), det(*uprights)
@@ -114,7 +116,7 @@ def _two_rays_plane(one: LockedLeg, two: LockedLeg, plane: LockedLeg) -> ClosedF
     expression = (turn * det(n, b, c) - dot(e, b) * slip) / dot(b, b)
     words = (
         f"some motion of the platform moves {one.tip.symbol} along {r1}, {two.tip.symbol} along {r2} and "
-        f"{plane.tip.symbol} normal to {n}, and turns it about a normal of {e}"
+        f"{plane.tip.symbol} normal to {n}, and rotates it about a normal of {e}"
     )
     return ClosedForm(words, expression)
 
@@ -127,7 +129,7 @@ def _ray_two_planes(ray: LockedLeg, one: LockedLeg, two: LockedLeg) -> ClosedFor
     expression = dot(_name_of(one.normal), r) * arms[1] - dot(_name_of(two.normal), r) * arms[0]
     words = (
         f"some motion of the platform moves {ray.tip.symbol} along {r}, {one.tip.symbol} normal to "
-        f"{_name_of(one.normal)}, {two.tip.symbol} normal to {_name_of(two.normal)}, and turns it about the "
+        f"{_name_of(one.normal)}, {two.tip.symbol} normal to {_name_of(two.normal)}, and rotates it about the "
         f"normal of {_name_of(one.upright)}, {_name_of(two.upright)}"
     )
     return ClosedForm(words, expression)

@@ -1,7 +1,8 @@
-"""The Type 2 condition of a pattern: rows that must lose rank, a SymPy expression that must vanish, and words.
+"""Type 2 condition of a pattern: rows that must lose rank, a SymPy expression that must vanish, and words.
 
-Feasible motions of the platform have coordinates x (d of them); held leg i allows those for which its tip's velocity
-J_i x lies along its line: N_i J_i x = 0. A freedom is lost where the stacked rows have a kernel (theory.md 7).
+Feasible motions of the platform have coordinates x (d of them); locked leg i allows those for which its tip's
+velocity J_i x lies along its line: N_i J_i x = 0. A platform dof is unobserved where the stacked rows have a kernel
+(theory.md 7).
 """
 
 from __future__ import annotations
@@ -29,11 +30,9 @@ Values = Mapping[str, Array]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Condition(Value):
-    """When the controller loses a freedom of the platform: in words and as an expression that vanishes there.
-
-    ``signed`` says that the expression changes its sign across the locus, ``never`` that it cannot vanish; ``factors``
-    are those that were split off: they vanish only where a part of the robot has no length.
-    """
+    """Condition under which a platform dof is unobserved: in words, and as an expression that vanishes there.
+    ``signed``: the expression changes its sign across the locus; ``never``: it cannot vanish; ``factors``: trivial
+    factors, which vanish only where a part of the robot has no length."""
 
     words: str
     expression: Any
@@ -41,12 +40,12 @@ class Condition(Value):
     factors: tuple[str, ...] = ()
     never: bool = False
     where: Mapping[str, str] = field(default_factory=dict)
-    """What each symbol means."""
+    """Meaning of each symbol."""
     parts: tuple[tuple[Any, str], ...] = ()
     """Factors of the expression, which vanishes where one of them does, each with what that means."""
 
     def rows(self, here: PatternValues) -> Array:
-        """The rows (n, rows, d) that have a kernel exactly where a freedom is lost."""
+        """Rows (n, rows, d) that have a kernel exactly where a platform dof is unobserved."""
         raise NotImplementedError
 
     def evaluate(self, here: PatternValues) -> Array:
@@ -123,7 +122,7 @@ def condition(pattern: ConstraintPattern, observation_model: ObservationModel) -
         return _general(observation_model)
     if pattern.motion == "translations" and (fixed := [leg for leg in pattern.legs if leg.fixed]):
         what = "motion" if any(leg.turns == 0 for leg in fixed) else "translation"
-        return Named(f"never: a held leg leaves the platform no {what}", _number(1), never=True, pattern=pattern)
+        return Named(f"never: a locked leg leaves the platform no {what}", _number(1), never=True, pattern=pattern)
     lines = [leg for leg in pattern.legs if leg.line is not None]
     if pattern.motion == "translations":
         return _translations(pattern, lines)
@@ -188,8 +187,8 @@ def _translations(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Con
 
 
 def _apart(pattern: ConstraintPattern) -> str | None:
-    """Why held legs leave no translation x in common at any pose, None where this is not known: x would have to lie
-    along each line that is constant, and be normal to each constant axis about which a tip turns and to each constant
+    """Reason why locked legs allow no common translation x at any pose, None if this is not known: x would have to lie
+    along each line that is constant, and be normal to each constant axis about which a tip rotates and to each constant
     normal of a tip's plane; no x does where these rows have rank 3."""
     rows, reasons = [], []
     for leg in pattern.legs:
@@ -202,7 +201,7 @@ def _apart(pattern: ConstraintPattern) -> str | None:
             reasons.append(f"normal to the {axis.meaning}")
     if not rows or np.linalg.svd(np.vstack(rows), compute_uv=False)[2:].sum() <= SAME_RELATION:
         return None
-    return f"a translation that all legs leave would be {_and(reasons)}, which are constant, and there is none"
+    return f"a translation that all locked legs allow would be {_and(reasons)}; these are constant, and there is none"
 
 
 def _planar(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Condition:
@@ -219,7 +218,7 @@ def _planar(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Condition
 
 
 def _pivot(pattern: ConstraintPattern, line: LockedLeg, fixed: LockedLeg) -> Condition:
-    """One tip rests: the platform turns about it where the other tip's line is the path of that turn."""
+    """One tip is fixed: the platform rotates about it where the other tip's line is the path of that rotation."""
     dot, _, _ = products()
     one, other, along = fixed.tip.symbol, line.tip.symbol, _symbol(line.line)
     words = f"the line {one}{other} is normal to {along}"
@@ -251,7 +250,7 @@ def _bodies(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Condition
 
 
 def _gram(pattern: ConstraintPattern) -> Condition:
-    """det Σ J_iᵀ N_i J_i: more rows than freedoms, they must lose rank together."""
+    """det Σ J_iᵀ N_i J_i: more rows than dof, they must lose rank together."""
     import sympy
 
     size = 4 if pattern.motion == "bodies" else 6
@@ -326,16 +325,16 @@ def _general(observation_model: ObservationModel) -> General:
         "X": "twist of the platform",
         "Y": "rates of what is observed",
     }
-    words = "the legs, with their measurements held, transmit no wrench against some motion of the platform"
+    words = "the legs, with their measured values fixed, transmit no wrench against some motion of the platform"
     return General(words, sympy.Determinant(M.T * M), where=where, observation_model=observation_model)
 
 
 def always(pattern: ConstraintPattern, lost: str) -> str:
-    """Words for a robot that loses freedoms everywhere, with those that say how many and which."""
+    """Return the words for a robot with dof unobserved everywhere; ``lost`` names them."""
     text = f"always: {lost}"
     lines = [leg for leg in pattern.legs if leg.line is not None]
     if pattern.motion == "spatial" and (names := _on_one_line(pattern.legs)):
-        return f"{text}, because {names} are on one line, about which the platform can turn"
+        return f"{text}, because {names} are on one line, about which the platform can rotate"
     if pattern.motion != "planar" and len(lines) == len(pattern.legs) > 0:
         vectors = [u for leg in lines if (u := pattern.constant(leg.line)) is not None]
         if len(vectors) == len(lines) > 1 and all(
@@ -346,7 +345,7 @@ def always(pattern: ConstraintPattern, lost: str) -> str:
 
 
 def _on_one_line(legs: Sequence[LockedLeg]) -> str:
-    """The tips where these, two at least, are on one line in one link, and nothing else is held; else empty."""
+    """Tips, if these (two at least) are on one line in one link, and nothing else is locked; else empty."""
     if len(legs) < 2 or len({leg.tip.link for leg in legs}) > 1 or any(leg.turning is not None for leg in legs):
         return ""
     arms = np.array([leg.tip.place - legs[0].tip.place for leg in legs[1:]])
@@ -364,7 +363,7 @@ def _words_of(features: Iterable[NamedVector | None]) -> str:
 
 
 _KINDS = {
-    "u": "watched directions",
+    "u": "observed directions",
     "p": "P axes",
     "t": "tangents",
     "a": "axes",
@@ -377,14 +376,15 @@ _KINDS = {
 
 
 def _moves(legs: Sequence[LockedLeg]) -> str:
-    """What all tips do, and how the body turns: ``moves every tip Bi along ui (i = 1, 2, 3)`` where they are alike."""
+    """Motion of all tips and of the platform in words: ``moves every tip Bi along ui (i = 1, 2, 3)`` if they are
+    alike."""
     tips = [leg for leg in legs if not leg.free]
     alike = {(leg.tip.symbol[0], _allowed_words(leg).replace(leg.tip.symbol[1:], "i")) for leg in tips}
     parts = []
     if len(alike) > 1 or len(tips) == 1:
         still = [leg.tip.symbol for leg in tips if leg.fixed]
         moved = [f"{leg.tip.symbol} {_allowed_words(leg)}" for leg in tips if not leg.fixed]
-        parts = [*([f"leaves {_and(still)} at rest"] if still else []), *([f"moves {_and(moved)}"] if moved else [])]
+        parts = [*([f"leaves {_and(still)} fixed"] if still else []), *([f"moves {_and(moved)}"] if moved else [])]
     elif alike:
         tip, allowed = next(iter(alike))
         parts = [f"moves every tip {tip}i {allowed} (i = {', '.join(leg.tip.symbol[1:] for leg in tips)})"]
@@ -393,11 +393,11 @@ def _moves(legs: Sequence[LockedLeg]) -> str:
         for leg in legs
         if leg.turning is not None
     ]
-    return " and ".join([*parts, *([f"turns it {_and(turns)}"] if turns else [])])
+    return " and ".join([*parts, *([f"rotates it {_and(turns)}"] if turns else [])])
 
 
 def _cylinders(legs: Sequence[LockedLeg]) -> str:
-    """What is so besides where more than three image points of one camera lose a freedom."""
+    """Return what also holds where more than three image points of one camera leave a dof unobserved."""
     rays = [leg for leg in legs if leg.eye is not None and leg.line is not None and leg.turning is None]
     eyes = {leg.eye.symbol for leg in rays if leg.eye is not None}
     if len(rays) < 4 or len(eyes) > 1:
@@ -407,7 +407,7 @@ def _cylinders(legs: Sequence[LockedLeg]) -> str:
 
 def _allowed_words(leg: LockedLeg) -> str:
     if leg.fixed:
-        return "at rest"
+        return "fixed"
     return f"along {_symbol(leg.line)}" if leg.line is not None else f"normal to {_symbol(leg.normal)}"
 
 

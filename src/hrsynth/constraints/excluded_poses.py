@@ -1,11 +1,10 @@
-"""What a named condition leaves out: poses at which the platform may move as it does nowhere else.
+"""Poses that a named condition does not cover: those at which the platform can move as it does nowhere else.
 
-At a constraint singularity the loops lose rank, and a platform that translates, or moves in a plane, may turn or leave
-that plane there, and go on in another operation mode. It then turns with rates that every leg's joints can give its
-end, and these are within one space for each leg, the span of what they can give over all samples. Where no direction is
-in the spaces of all legs of a body, where one leg alone keeps it in its plane, and where a leg with its measurements
-held leaves it no such motion, there is no such pose. A platform in space is held by what the condition names and by
-nothing else, at all poses.
+At a constraint singularity the loops lose rank. A platform that translates, or moves in a plane, may rotate or leave
+that plane there, and continue in another operation mode. Its angular velocity then lies in the space that the joints
+of every leg span over all samples. There is no such pose if these spaces of all legs have no common direction, if one
+leg alone keeps the platform in its plane, or if a locked leg allows no such motion. A spatial platform is
+constrained by what the condition names and by nothing else, at all poses.
 """
 
 from __future__ import annotations
@@ -39,8 +38,8 @@ def unexamined_poses(
     folding = [leg.label for leg in decomposition.legs if leg.has_loops]
     if folding:
         found.append(
-            f"poses at which a loop inside a leg ({', '.join(folding)}) lies flat, and those behind them, at "
-            "which it closes another way (crossed rods), are not examined"
+            f"poses at which a loop inside a leg ({', '.join(folding)}) is flat, and those beyond, at "
+            "which it has another assembly mode (crossed rods), are not examined"
         )
     more: tuple[str, ...] = ()
     if pattern.motion in ("translations", "bodies") and may_turn(decomposition, pattern.legs, samples):
@@ -58,8 +57,8 @@ def unexamined_poses(
 def may_turn(
     decomposition: LegDecomposition, held: Sequence[LockedLeg], samples: Sequence[ClosedConfiguration]
 ) -> bool:
-    """Whether a body of the platform may turn at some pose with these legs held, as far as the turns of all legs'
-    joints tell."""
+    """Return True if a platform link may rotate at some pose with these legs locked, judged by the joint axes of all
+    legs."""
     if decomposition.point is not None:
         return False
     for body in dict.fromkeys(leg.platform_link for leg in decomposition.legs):
@@ -77,7 +76,7 @@ def may_turn(
 def _may_leave_the_plane(
     decomposition: LegDecomposition, pattern: ConstraintPattern, samples: Sequence[ClosedConfiguration]
 ) -> bool:
-    """Whether none of the legs, held or not, keeps the platform in its plane."""
+    """Return True if no leg, locked or not, keeps the platform in its plane."""
     assert pattern.plane is not None
     if pattern.flat and any(leg.turns == 1 and not leg.virtual for leg in pattern.legs):
         return False
@@ -89,7 +88,7 @@ def _may_leave_the_plane(
 
 
 def _twists(decomposition: LegDecomposition, body: str, samples: Sequence[ClosedConfiguration]) -> list[Array]:
-    """Of each leg that ends on a body: what its joints can give its end, over all samples, (6, k)."""
+    """Basis (6, k) of the twists that the joints of each leg on a link can give its end, over all samples."""
     return [
         np.hstack(leg_twists_together(samples, leg, (), decomposition.mechanism.base))
         for leg in decomposition.legs

@@ -1,15 +1,15 @@
-"""Whether what a held leg leaves its end is of one kind at all poses, or grows where a U joint before the watched link
-turns about the watched direction.
+"""Test whether the motions that a locked leg allows its end are of one kind at all poses.
 
-Turns about axes a₁ … a_m before a link keep its direction u if Σ θ̇ᵢ aᵢ ∥ u. With a ball among them, or all axes
-parallel, these rates have one dimension at all poses. Let the last two axes else meet in a point C: where u lies in
-their plane they can turn the link about the line through C along u, and the other axes leave C no more than elsewhere.
-Such a turn leaves a tip at rest that stays on this line: the leg's end may then turn about u besides. An end that only
-translates feels it where the joints beyond the link turn back.
+They may gain a dimension where a U joint before the observed link rotates about the observed direction. Rotations
+about axes a₁ … a_m before a link preserve its direction u if Σ θ̇ᵢ aᵢ ∥ u. With an S among them, or all axes parallel,
+these rates have one dimension at all poses. Otherwise let the last two axes meet in a point C: where u lies in their
+plane they can rotate the link about the line through C along u, and the other axes move C no more than elsewhere.
+Such a rotation fixes a tip that stays on this line: the leg's end may then also rotate about u. An end that only
+translates is affected where the joints beyond the link rotate back.
 
-A parallelogram or equal parallel rods, none of them flat, carry what hangs on them as one rod does that ends in the
-tip: a rod that is watched turns as that one, a parallelogram that is passed turns nothing. In any other loop the rates
-of the joints depend on each other, and at a dead point the watched link rests while others move.
+A parallelogram or equal parallel rods, none of them flat, guide the next link as one rod does that ends in the tip: an
+observed rod rotates as that one; a parallelogram on the path rotates nothing. In any other loop the joint rates
+depend on each other, and at a dead point the observed link is fixed while others move.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ def may_gain_motion(
     samples: Sequence[ClosedConfiguration],
     translating: bool,
 ) -> str:
-    """What a held leg may leave its end (tips (n, 3), characteristic lengths) at special poses
-    alone: nothing more (empty), a ``turn`` through the tip, or motions of the ``tip``.
-    Of an end that is ``translating``, motions in which it does not turn."""
+    """Motions that a locked leg may allow its end (tips (n, 3), characteristic lengths) at special poses alone: none
+    (empty), a ``turn`` through the tip, or motions of the ``tip``. For an end that is ``translating``, motions without
+    rotation."""
     held = _Held(samples[0].model.mechanism, leg, reference, tips, samples, translating)
     found: dict[Observation, str] = {}
     while True:
@@ -68,8 +68,8 @@ class _Held:
     joints: set[str] = field(default_factory=set)
 
     def grows(self, lock: Observation) -> str:
-        """What an observation, with these joints at rest, may leave more at special poses; joints that it holds at all
-        poses are added."""
+        """Motions that an observation, with these joints fixed, may allow in addition at special poses; joints that it
+        fixes at all poses are added."""
         if isinstance(lock, Encoder):
             return self._code_of(self.mechanism.joints[lock.joint])
         near, far = lock.seen_from or self.reference, lock.link
@@ -134,8 +134,8 @@ def _grows(held: _Held, way: _Way, lock: SeenAxis) -> str:
 def _cannot_turn_back(
     mechanism: Mechanism, leg: Leg, lock: Direction, u: Array, samples: Sequence[ClosedConfiguration]
 ) -> bool:
-    """Whether the joints from the watched link to the leg's end make no turn about u: they have one direction, which
-    lies in that link as u does, and is not along u."""
+    """Return True if the joints from the observed link to the leg's end do not rotate about u: they have one direction,
+    which lies in that link as u does, and is not along u."""
     beyond = _way(mechanism, leg, lock.link, leg.platform_link)
     if leg.has_loops or beyond is None or any(joint.type is JointType.SPHERICAL for joint, _ in beyond.joints):
         return False
@@ -159,7 +159,7 @@ class _Way:
     far: Joint | None = None
     """The other end of the last link, where that is one of several equal parallel rods."""
     free: bool = True
-    """Whether the joints' rates do not depend on each other."""
+    """Return True if the joint rates do not depend on each other."""
     together: tuple[str, ...] = ()
     """All joints of such rods."""
 
@@ -182,7 +182,7 @@ def _way(mechanism: Mechanism, leg: Leg, one: str, other: str) -> _Way | None:
 
 
 def _contract(mechanism: Mechanism, leg: Leg, one: str, other: str) -> _Way:
-    """The same in a leg with loops, not ``free`` if it goes through one that is no parallelogram or parallel rods."""
+    """Classify a leg with loops, not ``free`` if it passes a loop other than a parallelogram or parallel rods."""
     tied = _Way((), free=False)
     words = _contraction(mechanism, leg)
     holder = next((edge for edge in words.edges() if other in edge.inside), None)
@@ -220,7 +220,7 @@ def _contraction(mechanism: Mechanism, leg: Leg) -> WordGraph:
 
 
 def _bridge(words: WordGraph, edge: WordEdge) -> bool:
-    """Whether nothing but this edge joins its two sides."""
+    """Return True if only this edge joins its two sides."""
     edges = list(words.edges())
     place = next(k for k, each in enumerate(edges) if each is edge)
     return is_bridge([(each.tail, each.head) for each in edges], place)

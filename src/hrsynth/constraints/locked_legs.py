@@ -1,4 +1,4 @@
-"""Legs with their measurements held, and the virtual legs of held observations: what they leave the platform.
+"""Locked legs, and the virtual legs of locked observations: the motions that they allow the platform.
 
 An observation of the platform holds its link by wrenches alone: forces at a point B leave B a line, a plane, a point or
 all of space, and moments leave turns about one axis, about all normals of one, or all (docs/pages/observations.md).
@@ -28,7 +28,7 @@ Place = tuple[str, tuple[float, ...]]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LockedLeg(Value):
-    """A leg with its measurements held, or the virtual leg of an observation of the platform.
+    """Locked leg, or the virtual leg of an observation of the platform.
 
     Its end ``tip`` on ``body`` may move along ``line``, or in the plane with this ``normal``, or not at all where
     ``fixed``; ``turns`` is the number of independent rotations about axes through the tip: of an observation those
@@ -46,20 +46,20 @@ class LockedLeg(Value):
     upright: NamedVector | None = None
     eye: BodyPoint | None = None
     virtual: bool = False
-    """Whether it is that of an observation."""
+    """True if it belongs to an observation."""
     spins: bool = False
-    """Whether at special poses its end may turn about what is watched besides."""
+    """True if its end may also rotate about the observed direction at special poses."""
     held_by: tuple[str, ...] = ()
     """The labels of the observations that hold it."""
 
     @property
     def turning(self) -> NamedVector | None:
-        """What says which turns an observation leaves, None where that is all of them, and for legs."""
+        """Vector that defines the rotations that an observation allows, None if it allows all, and for legs."""
         return self.about or self.upright
 
     @property
     def free(self) -> bool:
-        """Whether the tip may move anywhere."""
+        """Return True if the tip may move anywhere."""
         return self.line is None and self.normal is None and not self.fixed
 
     @property
@@ -232,7 +232,7 @@ def _candidates(
             plane,
             CrossProduct(
                 f"e{symbol}",
-                f"direction from {eye.symbol} to the foot of its perpendicular on {foot} of {seen.leg}",
+                f"direction from {eye.symbol} to the footpoint of its perpendicular on {foot} of {seen.leg}",
                 d,
                 plane,
             ),

@@ -1,4 +1,4 @@
-"""Vectors of a robot that an engineer would name: watched directions, axes, tangents, tips; each a function of poses.
+"""Named vectors of a robot: observed directions, axes, tangents, tips; each a function of poses.
 
 Values are in base axes; points in characteristic lengths. ``poses`` maps a link to its X_BL, shape (..., 4, 4), with
 positions in characteristic lengths.
@@ -103,7 +103,7 @@ class Segment(NamedVector):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Ray(Segment):
-    """The same from a camera's centre: where it has no length, nothing is seen."""
+    """Vector from a camera centre; of no length, nothing is visible."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -124,8 +124,8 @@ class CrossProduct(NamedVector):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TangentNormal(NamedVector):
-    """The normal of the plane through a point that touches a cylinder; its radius in characteristic lengths, whose sign
-    says which of the two planes."""
+    """Normal of the plane through a point that touches a cylinder. The sign of the radius (characteristic lengths)
+    selects one of the two planes."""
 
     start: BodyPoint
     on_axis: BodyPoint
@@ -170,5 +170,5 @@ def poses_at(configurations: Sequence[ClosedConfiguration], links: Sequence[str]
 
 
 def vanishes(block: Array) -> bool:
-    """Whether vectors, of any shape, are zero at all configurations."""
+    """Return True if vectors, of any shape, are zero at all configurations."""
     return bool(np.max(np.abs(block), initial=0.0) < SAME_RELATION)

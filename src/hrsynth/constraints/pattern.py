@@ -1,4 +1,4 @@
-"""The pattern of a robot's wrench systems with its measurements held, recognised over samples, never at one pose.
+"""Pattern of the wrench systems of a robot with locked legs, recognised over samples, never at one pose.
 
 With what is measured held, leg i lets its end translate along V_i and turn about axes through a point B_i; what the
 whole platform can still do must be in all of them (theory.md 7). This module finds V_i, B_i and their names.
@@ -35,12 +35,9 @@ TURNING = (JointType.REVOLUTE, JointType.UNIVERSAL, JointType.CYLINDRICAL)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ConstraintPattern(Value):
-    """How the platform can move and what the held legs leave of it.
-
-    ``motion`` is ``translations`` (held legs leave translations alone), ``planar``, ``spatial``, ``oriented`` (spatial,
-    and some legs forbid a part of the turns), ``bodies`` (an articulated platform whose bodies translate, one along
-    ``slide`` relative to the other) or ``other``.
-    """
+    """Motion of the platform, and what the locked legs allow of it. ``motion`` is ``translations`` (locked legs allow
+    translations alone), ``planar``, ``spatial``, ``oriented`` (spatial, some legs constrain rotations), ``bodies`` (an
+    articulated platform whose links translate, one along ``slide`` relative to the other) or ``other``."""
 
     motion: str
     base: str
@@ -50,12 +47,12 @@ class ConstraintPattern(Value):
     plane: NamedVector | None = None
     """The normal of the plane in which everything moves, of ``translations`` that in which all tips move, or None."""
     flat: bool = True
-    """Of ``planar``: whether the lines along which the held legs let their tips move are in that plane."""
+    """For ``planar``: True if the lines along which the locked legs let their tips move are in that plane."""
     slide: NamedVector | None = None
     steady: Mapping[str, Array] = field(default_factory=dict)
-    """Of ``translations``: the links of the named vectors that never turn, with their rotations R_BL (3, 3)."""
+    """For ``translations``: links of the named vectors that never rotate, with their rotations R_BL (3, 3)."""
     turning: bool = False
-    """Of ``translations``: whether the platform turns where nothing is held; it may then be held turned otherwise."""
+    """For ``translations``: True if the unlocked platform rotates; it may then be locked in another orientation."""
 
     def constant(self, vector: NamedVector | None) -> Array | None:
         """The direction (3,), in the base, of a vector that is fixed in a link that never turns; None of others."""
@@ -98,8 +95,8 @@ class PatternValues(Value):
         return found
 
     def allowances(self, leg: LockedLeg) -> Array:
-        """What a held leg forbids the bodies of the platform, (n, rows, 6 bodies), on the twists of their frames'
-        origins: its tip's velocity across V_i, and a turn where it allows none."""
+        """Constraints of a locked leg on the platform links, (n, rows, 6 bodies), on the twists of their frames'
+        origins: the tip's velocity across V_i, and the rotation where it allows none."""
         arms = leg.tip.value(self._poses) - self._poses[leg.body][:, :3, 3]
         across = forbidden(leg, self.values)
         blocks = np.concatenate([across, -across @ hat(arms)], axis=2)
@@ -119,8 +116,8 @@ def leg_ends(decomposition: LegDecomposition) -> tuple[str, ...]:
 
 
 def placing_links(decomposition: LegDecomposition) -> tuple[str, ...]:
-    """The links of the platform that tell where it is: those on which legs end, and the controlled one where these
-    leave it several poses."""
+    """Links that define the platform pose: those on which legs end, and the controlled one where these allow several
+    poses."""
     return (
         leg_ends(decomposition)
         if decomposition.decided
@@ -136,7 +133,7 @@ def recognise(
     everywhere: bool = True,
 ) -> ConstraintPattern:
     """The pattern at the samples; ``motion`` is ``other`` where it is none of the known ones, or, unless it need not
-    hold ``everywhere``, where a held leg may leave its end more at special poses."""
+    hold ``everywhere``, where a locked leg may allow its end more at special poses."""
     other = ConstraintPattern("other", decomposition.mechanism.base, leg_ends(decomposition))
     base, bodies = decomposition.mechanism.base, leg_ends(decomposition)
     motions = _motions(decomposition, observation_model, samples)
@@ -212,7 +209,8 @@ def recognise(
 def _turns_about(
     normal: NamedVector, leg: LockedLeg, systems: Sequence[Array], samples: Sequence[ClosedConfiguration]
 ) -> bool:
-    """Whether a held leg, which allows these twists (6, k), lets its end turn about the normal through its tip."""
+    """Return True if a locked leg, which allows these twists (6, k), lets its end rotate about the normal through its
+    tip."""
     poses = poses_at(samples, [*normal.links, *leg.tip.links])
     n, B = normal.value(poses), leg.tip.value(poses)
     turns = np.hstack([cross(B, n), n])
@@ -237,7 +235,8 @@ def _one_body(
     motions: Array,
     samples: Sequence[ClosedConfiguration],
 ) -> ConstraintPattern | None:
-    """The pattern of one body: of the ``legs`` that are watched, or of ``every`` leg, None where one has none."""
+    """Return the pattern of one platform link: of the observed ``legs``, or of ``every`` leg; None where one has
+    none."""
     base, bodies = decomposition.mechanism.base, leg_ends(decomposition)
     own = [leg for leg in legs if not leg.virtual]
     if len(own) < len(decomposition.legs) and motions.shape[2] < (2 if own else 3):  # the other legs hold as well
@@ -274,15 +273,15 @@ def _translations(
     motions: Sequence[Array],
     samples: Sequence[ClosedConfiguration],
 ) -> ConstraintPattern | None:
-    """The pattern of translations, bases (3, d) of which are given: of the ``legs`` that are watched where these leave
-    the tips none but such, else of ``every`` leg, since the others hold as well; None where one of them has none."""
+    """Return the pattern of translations with the bases (3, d): of the observed ``legs`` if these allow the tips only
+    such, else of ``every`` leg, since the others constrain as well; None where one of them has none."""
     if len(motions) == len(samples) and all(_within(leg, motions, samples) for leg in legs):
         return _translating(decomposition, legs, samples)
     return None if every is None else _translating(decomposition, every, samples)
 
 
 def _within(leg: LockedLeg, motions: Sequence[Array], samples: Sequence[ClosedConfiguration]) -> bool:
-    """Whether a leg lets its tip move in these directions (3, d) alone, at all samples."""
+    """Return True if a leg lets its tip move in these directions (3, d) alone, at all samples."""
     poses = poses_at(samples, [link for feature in leg.features for link in feature.links])
     across = forbidden(leg, {feature.symbol: feature.value(poses) for feature in leg.features})
     return all(vanishes((np.eye(3) - F @ F.T) @ (np.eye(3) - N)) for F, N in zip(motions, across, strict=True))
@@ -309,8 +308,8 @@ def _translating(
 def _two_bodies(
     decomposition: LegDecomposition, legs: tuple[LockedLeg, ...], motions: Array, samples: Sequence[ClosedConfiguration]
 ) -> ConstraintPattern | None:
-    """Two bodies that only translate, the second along one direction relative to the first; with them the controlled
-    link must be at rest, which it need not where it hangs on them by loops that have dead points."""
+    """Pattern of two links that only translate, the second along one direction relative to the first. The controlled
+    link must be fixed with them, which fails if it is joined by loops with dead points."""
     bodies = leg_ends(decomposition)
     still = motions[:, [3, 4, 5, 9, 10, 11]]
     if not decomposition.decided or len(bodies) != 2 or motions.shape[2] != 4 or not vanishes(still):
@@ -333,7 +332,7 @@ def _two_bodies(
 def _motions(
     decomposition: LegDecomposition, observation_model: ObservationModel, samples: Sequence[ClosedConfiguration]
 ) -> Array:
-    """Bases (n, 6 bodies, d) of what the platform's bodies can do with nothing held; they differ in number where the
+    """Bases (n, 6 bodies, d) of the motions of the platform links with nothing locked; they differ in number where the
     samples are not alike, then the largest are kept."""
     asked = replace(observation_model, bodies=leg_ends(decomposition), observations=())
     found = [relation(at, asked).basis[asked.twist_rows :] for at in samples]
@@ -345,7 +344,7 @@ def _motions(
 def moving(
     decomposition: LegDecomposition, observation_model: ObservationModel, samples: Sequence[ClosedConfiguration]
 ) -> tuple[str, Array | None]:
-    """How a platform of one body moves with nothing held: ``translations``, ``planar`` with the normal, or
+    """Motion of a platform of one link with nothing locked: ``translations``, ``planar`` with the normal, or
     ``spatial``."""
     motions = _motions(decomposition, observation_model, samples)
     if vanishes(motions[:, 3:]):
@@ -396,7 +395,7 @@ def _locked_leg(
     everywhere: bool,
     translating: bool,
 ) -> LockedLeg | None:
-    """The leg's pattern with these observations held, alike at all samples (``everywhere``: all poses), or None."""
+    """Pattern of the leg with these observations locked, alike at all samples (``everywhere``: all poses), or None."""
     try:
         systems = leg_twists_together(samples, leg, locks, reference)
     except ValueError:
@@ -465,7 +464,7 @@ def _name_vector(
         if isinstance(lock, Direction):
             candidates.append(
                 BodyVector(
-                    f"u{symbol}", f"direction watched in leg {leg.label} ({lock.link})", lock.link, lock.direction
+                    f"u{symbol}", f"direction observed in leg {leg.label} ({lock.link})", lock.link, lock.direction
                 )
             )
     joints = [mechanism.joints[name] for name in leg.joints]
@@ -517,7 +516,7 @@ def _segments(decomposition: LegDecomposition, names: Sequence[str], symbol: str
 
 
 def _along(feature: NamedVector, values: Array, samples: Sequence[ClosedConfiguration]) -> bool:
-    """Whether a feature is parallel to vectors (n, 3) at all samples."""
+    """Return True if a feature is parallel to vectors (n, 3) at all samples."""
     found = feature.value(poses_at(samples, feature.links))
     if np.min(np.linalg.norm(found, axis=1)) < SAME_RELATION:
         return False

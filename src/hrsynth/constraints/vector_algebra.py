@@ -56,7 +56,7 @@ def products() -> Products:
 
 
 def __getattr__(name: str) -> Any:
-    """Where a pickled expression finds the products."""
+    """Return the products that a pickled expression names."""
     if name not in Products._fields:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(products(), name)

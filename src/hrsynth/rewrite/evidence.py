@@ -1,4 +1,4 @@
-"""What the rules may know of the real robot: loci of directions and anchors, over whole motions, never at one pose."""
+"""Facts about the real robot that rules use: loci of directions and proximal centres over whole motions."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def locus(points: Array, scale: float) -> LinearLocus:
 
 @dataclass(frozen=True, eq=False)
 class ProximalChain:
-    """The part of a leg between the reference link and the observed link ℓ, moved on its own.
+    """Part of a leg between the reference link and the observed link ℓ, moved on its own.
 
     ``joints`` are its joints, ``before`` its last link, ``k_joint`` the joint K to ℓ, ``anchor`` A at zero.
     """
@@ -58,26 +58,26 @@ class ProximalChain:
     rotations: Array
     """Orientations of ``before`` seen from the reference link, relative to the zero configuration, (n, 3, 3)."""
     anchors: Array
-    """Positions of A, (n, 3), in base coordinates with the reference link held."""
+    """Positions of A, (n, 3), in base coordinates with the reference link fixed."""
     length: float
 
     @cached_property
     def anchor_locus(self) -> LinearLocus:
-        """The flat on which A moves."""
+        """Linear locus of A."""
         return locus(self.anchors, self.length)
 
     @cached_property
     def translates(self) -> bool:
-        """Whether the link before K only translates relative to the reference link."""
+        """Return True if the link before K only translates relative to the reference link."""
         return bool(np.max(np.abs(self.rotations - np.eye(3))) < LOCUS)
 
     def keeps(self, direction: Array) -> bool:
-        """Whether a direction fixed in the link before K is constant seen from the reference link."""
+        """Return True if a direction fixed in the link before K is constant in the reference link."""
         return bool(np.max(np.abs(self.rotations @ direction - direction)) < LOCUS)
 
     @cached_property
     def turning_axis(self) -> Array | None:
-        """The constant direction about which the link before K turns, or None."""
+        """Constant direction about which the link before K rotates, or None."""
         spread = np.concatenate([R - np.eye(3) for R in self.rotations])
         _, s, Vt = np.linalg.svd(spread)
         if s[0] < LOCUS or s[2] > LOCUS * len(self.rotations):
@@ -103,14 +103,14 @@ class Evidence:
         self._proximal: dict[str, ProximalChain | None] = {}
 
     def directions(self, index: int) -> Array:
-        """All sampled values of observation ``index``, (n, 3), in base coordinates with the reference link held."""
+        """All sampled values of observation ``index``, (n, 3), in base coordinates with the reference link fixed."""
         home = self.mechanism.links[self.reference].pose[:3, :3]
         values = [target.measured[index][1] for member in self.samples.members for target in member.way]
         return np.asarray(values) @ home.T
 
     def far(self, index: int) -> Array | None:
-        """A unit vector in base axes, fixed in the reference link, as far as possible from all sampled values of what
-        the chain of observation ``index`` turns first; None where the values do not say what that is."""
+        """Unit vector in base axes, fixed in the reference link, as far as possible from all sampled values of what the
+        first joint of the chain of observation ``index`` rotates; None where the values do not define that."""
         seen = self.samples.observation_model.observations[index]
         assert isinstance(seen, SeenAxis | CameraObservation)
         values = np.asarray([target.measured[index][1] for member in self.samples.members for target in member.way])
@@ -120,7 +120,7 @@ class Evidence:
         return None if pointing is None else home[:3, :3] @ far_from(pointing)
 
     def can_spin(self, link: str, direction: Array) -> bool:
-        """Whether a link can turn about its own direction with every other link at rest.
+        """Return True if a link can rotate about its direction while every other link is fixed.
 
         Links that it carries along on a P of the same direction may turn with it.
         """
@@ -208,7 +208,7 @@ class Evidence:
 def _move_at_random(
     mechanism: Mechanism, reference: str, nodes: set[str], joints: Sequence[Joint], before: str, anchor: Array
 ) -> tuple[Array, Array]:
-    """Orientations of ``before`` and positions of the anchor over random motions of the part alone."""
+    """Return orientations of ``before`` and positions of A over random motions of the chain alone."""
     if before == reference:
         return np.eye(3)[None], anchor[None]
     part = Mechanism.of(

@@ -1,8 +1,8 @@
-"""What a rule is: ``find`` says where it applies and why, ``apply`` rewrites one such place.
+"""Interface of a rule: ``find`` yields the places where it applies, ``apply`` rewrites one of them.
 
-A rule knows nothing of order, of proof or of leave. Strategies (:mod:`.strategy`) say when it is tried, the certificate
-whether what it proposes is the same robot to a camera; and where a rule may be applied without its side condition is
-not for the rule to know either: it says which condition fails (``Match.unmet``), the strategy decides.
+A rule does not know the order of rules or the proof. Strategies (:mod:`.strategy`) decide when it is tried, the
+equivalence check whether its result is the same robot to a camera. A rule names the side condition that fails
+(``Match.unmet``); the strategy decides whether it is applied all the same.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ Found = TypeVar("Found")
 
 
 class Stage(Enum):
-    """What a rule works on; in which order the stages come is up to a strategy."""
+    """Part of the robot that a rule rewrites; strategies choose the order of the stages."""
 
     MOTORS = "the real motors"
     LIFT = "the virtual chain of a leg, from nothing"
     DIRECTION = "the virtual actuator, by the locus of the direction"
-    ANCHOR = "the sliders under the actuator, by the locus of the anchor"
+    ANCHOR = "the sliders under the actuator, by the locus of the proximal centre"
     JOINT = "the real joint K before the observed link"
     BESIDE = "links that are joined as the observed one is"
-    FORM = "the way in which the actuator's carrier is led"
+    FORM = "the guidance of the actuator's carrier"
     LEG = "a leg that is not observed"
     ENDS = "the ends of the observed legs on the platform"
 
@@ -52,7 +52,7 @@ class Match(Generic[Found]):
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why a rule does not apply."""
+    """Reason why a rule does not apply."""
 
     reason: str
 
@@ -78,10 +78,10 @@ def whole_leg(state: State, leg: str) -> Sequence[str]:
 
 @dataclass(frozen=True, eq=False)
 class Rule(Generic[Place, Found]):
-    """A rule of a source, at a stage.
+    """Rule with its source and stage.
 
-    ``find(state, evidence, place)`` yields matches in order of preference, or a refusal, or nothing where there is
-    nothing to say; ``apply(state, found)`` is the state rewritten there. ``places(state, leg)`` are those of a leg.
+    ``find(state, evidence, place)`` yields matches in order of preference, or a refusal, or nothing;
+    ``apply(state, found)`` returns the rewritten state. ``places(state, leg)`` are the places of a leg.
     """
 
     name: str
@@ -91,12 +91,12 @@ class Rule(Generic[Place, Found]):
     apply: Callable[[State, Found], State]
     places: Callable[[State, str], Sequence[Place]]
     otherwise: str | None = None
-    """Why it is refused where nothing is found at any place of a leg."""
+    """Reason of the refusal if nothing is found at any place of a leg."""
     always: bool = False
-    """Whether it holds for every robot: nothing is right where it is not accepted."""
+    """True if the rule holds for every robot: then it must be accepted."""
     keeps: tuple[str, ...] = ()
-    """Where ρ is kept at singular configurations too, of which the certificate has none: sufficient conditions in words
-    (docs/pages/theory.md, section 4); none needed where it is empty."""
+    """Sufficient conditions, in words, under which ρ is preserved at singular configurations too (docs/pages/theory.md,
+    section 4); empty if none is needed."""
 
     def proposals(
         self, state: State, evidence: Evidence, leg: str = "", *, waive: bool = False

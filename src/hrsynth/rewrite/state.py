@@ -1,4 +1,4 @@
-"""What is rewritten: the mechanism so far, and the virtual chain of each observation in it."""
+"""State of a rewriting: the mechanism so far, and the virtual chain of each observation in it."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class VirtualChain(Value):
     roll: str | None
     taken: bool = False
     spins: bool = False
-    """Whether the takeover was of the kind that leaves the actuator's axes free."""
+    """True if the joint substitution left the actuator's axes free."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -147,7 +147,7 @@ class State(Value):
 
 
 def _relink(mechanism: Mechanism, chain: ObservationChain, known: set[str]) -> Mechanism:
-    """With the ends of a chain that lie on no known link moved to the base."""
+    """Return the state with the ends of a chain that lie on no known link moved to the base."""
     ends = [(chain.joints[0], chain.reference), (chain.joints[-1], chain.link)]
     joints = {name: mechanism.joints[name].relinked(link, mechanism.base) for name, link in ends if link not in known}
     return mechanism.changed(joints=joints.values()) if joints else mechanism

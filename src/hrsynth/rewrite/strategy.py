@@ -1,8 +1,9 @@
-"""Which rule is tried when: strategies composed of strategies, every step under the certificate and on the trace.
+"""Strategies: the order in which rules are tried, every step checked for equivalence and recorded.
 
-A strategy is a function from a rewriting to a rewriting that has gone further, as in term rewriting: ``chain`` runs
-strategies one after the other, ``each_leg`` tries the rules of some stages on legs, the first proposal that is accepted
-for each, ``best`` tries all proposals and goes on from the one after which most legs can go. All share a budget.
+A strategy is a function from a rewriting to a later one, as in term rewriting. ``chain`` runs strategies one after
+the other; ``each_leg`` tries the rules of some stages on legs and takes the first accepted proposal of each;
+``choose_fewest_legs`` tries all proposals and continues from the one after which most legs can be removed. All share
+a limit of attempts.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ BUDGET = 400
 
 
 class Comparison(Protocol):
-    """What a check answers: the certificate is one."""
+    """Result of a check, such as the equivalence check."""
 
     @property
     def passed(self) -> bool: ...
@@ -62,14 +63,15 @@ class Step(Record):
         if self.state is None or self.largest_angle is not None:
             return self
         found = check(self.state.mechanism, self.bodies)
-        reason = self.reason if found.passed else f"{self.reason} (by itself another robot: {found.reason})"
+        reason = self.reason if found.passed else f"{self.reason} (not equivalent by itself: {found.reason})"
         return replace(self, largest_angle=found.largest_angle, reason=reason)
 
 
 @dataclass(frozen=True, eq=False)
 class Rewriting:
-    """Where strategies came to, and how; ``check`` None accepts every proposal and waives side conditions. What rules
-    of ``unchecked`` stages propose is accepted where their side conditions hold: a later check compares the whole."""
+    """State of a derivation and its steps. With ``check`` None every proposal is accepted and side conditions are
+    waived. Proposals of ``unchecked`` stages are accepted where their side conditions hold: a later check compares the
+    whole."""
 
     state: State
     evidence: Evidence
@@ -77,7 +79,7 @@ class Rewriting:
     unchecked: frozenset[Stage] = frozenset()
     steps: tuple[Step, ...] = ()
     tried: int = 0
-    """How many proposals were checked."""
+    """Number of checked proposals."""
 
     @classmethod
     def of(cls, evidence: Evidence, check: Check | None = None, unchecked: Iterable[Stage] = ()) -> Rewriting:
@@ -87,8 +89,8 @@ class Rewriting:
 
     @property
     def virtual_only(self) -> bool:
-        """Whether the rules that always hold were accepted, and the virtual actuators are the only motors: then every
-        observed leg has one or is blind."""
+        """True if the rules that always hold were accepted and the virtual actuators are the only motors: every
+        observed leg then has one, or a constant direction."""
         driven = {joint.name for joint in self.state.mechanism.joints.values() if joint.actuated}
         return all(step.accepted for step in self.steps if step.always) and driven == self.state.actuators
 
@@ -109,7 +111,7 @@ class Rewriting:
         if self.check is None or rule.stage in self.unchecked:
             return self._after(rule, leg, True, proposal.reason, None, proposal)
         if self.tried >= BUDGET:
-            return self._after(rule, leg, False, "the budget of attempts is used up")
+            return self._after(rule, leg, False, "the limit of attempts is reached")
         found = self.check(proposal.state.mechanism, proposal.bodies)
         reason = proposal.reason if found.passed else f"{proposal.reason}: refused, {found.reason}"
         after = self._after(rule, leg, found.passed, reason, found.largest_angle, proposal)
@@ -130,11 +132,11 @@ class Rewriting:
 
 
 Strategy = Callable[[Rewriting], Rewriting]
-"""What takes a rewriting further."""
+"""Function that continues a rewriting."""
 
 
 def chain(*strategies: Strategy) -> Strategy:
-    """One strategy after the other."""
+    """Run one strategy after the other."""
 
     def run(at: Rewriting) -> Rewriting:
         for strategy in strategies:
@@ -170,8 +172,8 @@ def whole_robot(stage: Stage) -> Strategy:
 
 
 def choose_fewest_legs(stage: Stage, after: Strategy, left: Callable[[Rewriting], Iterable[str]]) -> Strategy:
-    """The proposal of a stage's rules from which another strategy leaves the fewest legs; none if none leaves fewer
-    than there are. The first that leaves nothing ends the search; others are taken back on the trace."""
+    """Take the proposal of a stage's rules from which another strategy leaves the fewest legs; none if none leaves
+    fewer than before. The first that leaves no leg ends the search; the others are marked as discarded."""
 
     def run(start: Rewriting) -> Rewriting:
         least, found, trace, tried = len(list(left(start))), start, start.steps, start.tried
@@ -192,7 +194,7 @@ def choose_fewest_legs(stage: Stage, after: Strategy, left: Callable[[Rewriting]
 
 
 def _taken_back(step: Step) -> Step:
-    return replace(step, accepted=False, reason=f"{step.reason} (taken back: legs remain)", state=None, discarded=True)
+    return replace(step, accepted=False, reason=f"{step.reason} (discarded: legs remain)", state=None, discarded=True)
 
 
 def observed_legs(at: Rewriting) -> tuple[str, ...]:
@@ -207,18 +209,18 @@ def unobserved_legs(at: Rewriting) -> tuple[str, ...]:
 
 
 def keep_unobserved(at: Rewriting) -> Rewriting:
-    """Say of the legs that are left why they are."""
-    reason = "nothing else restores the relation: the leg stays, passive"
+    """Record why the remaining legs stay."""
+    reason = "without the leg the velocity relation changes: it stays, passive"
     return replace(at, steps=at.steps + tuple(Step("keep", leg, True, reason, None) for leg in unobserved_legs(at)))
 
 
 def require_informative_leg(strategy: Strategy) -> Strategy:
-    """A strategy for robots of which some leg is not blind."""
+    """Restrict a strategy to robots with a leg whose direction is not constant."""
     return lambda at: strategy(at) if at.state.actuators else at
 
 
 OBSERVED_STAGES = frozenset(Stage) - {Stage.LEG, Stage.ENDS}
-"""The stages of the observed legs: where all hidden robot is, the relation of all steps together decides."""
+"""Stages of the observed legs: with a complete hidden robot, the velocity relation of all steps together decides."""
 
 LIFTED = chain(whole_robot(Stage.MOTORS), each_leg(observed_legs, Stage.LIFT))
 """The exact lift, of which the relation is that of the real robot for every robot."""
@@ -227,19 +229,19 @@ GENERAL = chain(LIFTED, each_leg(observed_legs, Stage.DIRECTION, Stage.ANCHOR, S
 """The general form: sliders under every virtual actuator, all legs kept."""
 
 DROPPED = each_leg(unobserved_legs, Stage.LEG)
-"""All unobserved legs tried, whether they can go."""
+"""Removal of unobserved legs, each tried."""
 
 SIMPLIFIED = chain(
     GENERAL,
     each_leg(observed_legs, Stage.FORM),
     require_informative_leg(chain(DROPPED, choose_fewest_legs(Stage.ENDS, DROPPED, unobserved_legs), keep_unobserved)),
 )
-"""The simplified form, as far as the certificate goes along with it: where unobserved legs hold the platform, the
-ends of the observed legs are changed; what still does not go is kept."""
+"""Simplified form, as far as the equivalence check passes: where unobserved legs constrain the platform, the ends of
+the observed legs are changed; legs that still cannot be removed stay."""
 
 
 FORMS = {"simplified": SIMPLIFIED, "general": GENERAL}
-"""The forms of a hidden robot that can be asked for."""
+"""Forms of a hidden robot, by name."""
 
 
 def apply_unchecked(evidence: Evidence, *, change_ends: bool) -> list[Rewriting]:

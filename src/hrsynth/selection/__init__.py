@@ -1,1 +1,2 @@
-"""Which legs to watch for one displacement: every set held against modes, aspects, sight, accuracy and a servo run."""
+"""Selection of legs to observe for one displacement: modes, aspects, visibility, accuracy and a simulated run of each
+set."""

@@ -1,5 +1,5 @@
-"""Where the loop to a goal may end with a set of legs: what attracts besides the goal, and from how far around the goal
-every start is proved to end there."""
+"""Equilibria of a servo loop with a set of legs: the stable ones besides the goal, and the proved attraction radius of
+the goal."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from ..simulation.outcome import GOAL
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LoopEnds(Value):
-    """The kinds of the rests that were found to attract, the goal and those beyond limits left out (None where they
-    were not sought), and the certified radius; ``why`` something is not known, else empty. That there are no other
-    rests is not said: they are found from random starts."""
+    """Stable equilibria and proved attraction radius of a goal. ``others`` are the kinds of the stable equilibria that
+    were found, without the goal and those beyond joint limits (None: not searched); there may be more. ``why`` is the
+    reason for what is unknown."""
 
     others: Annotated[tuple[str, ...] | None, As("kinds")]
     radius: CertifiedRadius | None
@@ -33,12 +33,12 @@ class LoopEnds(Value):
 
     @classmethod
     def of(cls, setup: ObservedRobot, goal: ClosedConfiguration, rounds: Iterable[Array] | None = None) -> LoopEnds:
-        """Those of a goal; ``rounds`` of starts as for :func:`.critical_points`."""
+        """Return those of a goal; ``rounds`` of starts as for :func:`.critical_points`."""
         try:
             found = EquilibriumSearch.of(setup, goal).answer(minima=True, rounds=rounds)
             others = tuple(sorted(each.kind for each in found.stable if each.kind != GOAL and not each.beyond_limits))
             if not all(each.by_segment for each in setup.observed):
-                return cls(others, None, "the radius is one of directions of segments only")
+                return cls(others, None, "the attraction radius is computed for directions of segments only")
             radius = certified_radius(setup, goal)
         except HrsynthError as error:
             return cls(None, None, str(error))
@@ -46,7 +46,7 @@ class LoopEnds(Value):
 
     @property
     def order(self) -> tuple[float, float]:
-        """What the best set has least of: poses that attract, and the radius' power of two (m), negative."""
+        """Sort key, smallest first: number of other stable equilibria, negative power of two of the radius (m)."""
         length = 0.0 if self.radius is None else self.radius.length
         return (
             math.inf if self.others is None else len(self.others),
@@ -55,16 +55,18 @@ class LoopEnds(Value):
 
     @property
     def length(self) -> float:
-        """The certified radius (m), 0 where there is none."""
+        """Proved attraction radius (m), 0 where there is none."""
         return 0.0 if self.radius is None else self.radius.length
 
     @property
     def words(self) -> str:
-        """How many poses besides the goal attract, by their kinds."""
+        """Number of other stable equilibria, by kind."""
         if self.others is None:
-            return "not sought"
-        kinds = ", ".join(f"{count} {kind}" for kind, count in Counter(self.others).items())
-        return kinds or "no other pose"
+            return "not searched"
+        kinds = ", ".join(
+            f"{count} {'nonzero error' if kind == CRITICAL else kind}" for kind, count in Counter(self.others).items()
+        )
+        return kinds or "none"
 
     attracting = Shown(int | None, lambda self: None if self.others is None else len(self.others))
     radius_mm = Shown(Number, lambda self: self.length or None, As(scale=MM))
@@ -75,8 +77,8 @@ class LoopEnds(Value):
 def fewer_are_better(
     best: tuple[tuple[str, ...], LoopEnds], others: Iterable[tuple[tuple[str, ...], LoopEnds]]
 ) -> str | None:
-    """Why a set of legs serves better than the largest that holds all of them and more, in a sentence; None where no
-    such set has more poses that attract or a smaller certified radius."""
+    """Explain in a sentence why a set ranks above the largest one that contains it; None if no such set has more stable
+    equilibria or a smaller proved attraction radius."""
     legs, ends = best
     worse = [
         (each, its)
@@ -88,14 +90,10 @@ def fewer_are_better(
     more, its = max(worse, key=lambda pair: len(pair[0]))
     first = f"fewer legs are better here: with {', '.join(legs)} "
     if its.order[0] > ends.order[0]:
-        why = (
-            "; the errors of more directions than there are freedoms can balance where they do not vanish"
-            if CRITICAL in (its.others or ())
-            else ""
-        )
+        why = "; with redundant observation, nonzero errors can balance" if CRITICAL in (its.others or ()) else ""
         return (
-            f"{first}the loop was found to be drawn to {ends.words} besides the goal, with {', '.join(more)} to "
+            f"{first}the stable equilibria found besides the goal are: {ends.words}; with {', '.join(more)}: "
             f"{its.words}{why}"
         )
     found = f"{1e3 * its.length:.3g} mm" if its.length else "undecided"
-    return f"{first}the certified radius is {1e3 * ends.length:.3g} mm, with {', '.join(more)} it is {found}"
+    return f"{first}the proved attraction radius is {1e3 * ends.length:.3g} mm, with {', '.join(more)} it is {found}"

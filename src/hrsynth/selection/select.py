@@ -1,5 +1,5 @@
-"""Which legs to watch for one displacement (MMT A.2): all sets, ranked by where else the loop may end and by the
-accuracy at the goal."""
+"""Ranking of sets of observed legs for one displacement (MMT A.2), by other stable equilibria and by accuracy at the
+goal."""
 
 from __future__ import annotations
 
@@ -53,9 +53,9 @@ from .loop_ends import LoopEnds, fewer_are_better
 from .sight import CameraView, camera_at, of_focal
 
 BUDGET = 2_000
-"""Intervals that a path's certificate may take."""
+"""Largest number of intervals of a path's certificate."""
 CONE = "0.1deg"
-"""Half-angle of the cones about directions where nothing is said."""
+"""Default half-angle of the cones about directions."""
 FOCAL = 800.0
 """Focal length of the camera (pixels)."""
 AUTO = "auto"
@@ -70,25 +70,25 @@ TYPES = {
 
 @dataclass(frozen=True)
 class Criteria:
-    """The criteria of :func:`select`, which takes each of them by its name. Raises ``BadRequest``."""
+    """Criteria of :func:`select`, which takes each of them by its name. Raises ``BadRequest``."""
 
     size: Annotated[int, option("Largest number of legs in a set.", low=1)] = 4
     """Legs of the largest sets."""
     examine: Annotated[
         int,
-        option("For how many sets, the most accurate first, to compute modes, aspects and runs.", low=1),
+        option("Number of sets, most accurate first, for which modes, aspects and runs are computed.", low=1),
     ] = 20
-    """Sets, the most accurate first, of which modes and aspects are asked."""
-    runs: Annotated[int, option("How many sets, best first, must pass a simulated run.", low=0)] = 3
-    """Sets that a simulated run is to lead to the goal."""
+    """Number of sets, most accurate first, with modes and aspects."""
+    runs: Annotated[int, option("Number of sets, best first, that must pass a simulated run.", low=0)] = 3
+    """Number of sets that must pass a simulated run."""
     equilibria: Annotated[
         int,
         option(
-            "For how many of the examined sets, the most accurate first, to compute where else the loop may end.",
+            "Number of examined sets, most accurate first, for which to search for other equilibria.",
             low=0,
         ),
     ] = 20
-    """Sets, of those that are examined and the most accurate first, whose endings are sought."""
+    """Number of examined sets, most accurate first, with other equilibria."""
     visible_from: Annotated[
         str | None,
         option(
@@ -98,12 +98,12 @@ class Criteria:
         ),
     ] = None
     """The pose of a camera on the link that carries it, or ``auto`` for one that sees all legs well."""
-    focal: Annotated[float, option("Focal length of the camera, for pictures of 640 × 480 pixels.", "PIXELS")] = FOCAL
+    focal: Annotated[float, option("Focal length of the camera, for images of 640 × 480 pixels.", "PIXELS")] = FOCAL
     """Its focal length (pixels)."""
 
     def __post_init__(self) -> None:
         if self.visible_from is None and self.focal != FOCAL:
-            raise BadRequest("focal length without a camera", self.focal, "together with --visible-from")
+            raise BadRequest(f"--focal {self.focal:g}: there is no camera", remedy="Give its pose with --visible-from.")
         for each in options_of(Criteria):
             if each.kind is int:
                 require_range(each.name, getattr(self, each.name), "an integer", each.low, each.high)
@@ -111,8 +111,8 @@ class Criteria:
 
 @dataclass(frozen=True)
 class ModeCount(Record):
-    """How many assembly modes, near ones too, there are with the directions of a pose, in how many of them the robot
-    was found assembled, and whether these are proved to be all; ``why`` they are not listed, otherwise empty."""
+    """Number of assembly modes, near ones included, at the directions of a pose; how many are reachable; whether the
+    list is proved complete; ``why`` they are not listed."""
 
     count: Recorded[int | None]
     reachable: Recorded[int | None]
@@ -121,7 +121,7 @@ class ModeCount(Record):
 
     @classmethod
     def of(cls, found: AssemblyModes) -> ModeCount:
-        """Of a list of modes."""
+        """Return the count of a list of modes."""
         alike = (*found.modes, *found.near_modes)
         return cls(len(alike), sum(mode.reachable is True for mode in alike), found.found.complete)
 
@@ -130,14 +130,14 @@ class ModeCount(Record):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Decision(Compared, all_recorded=True):
-    """A verdict in a word, and its reason."""
+    """Verdict and its reason."""
 
     verdict: str
     reason: str
 
 
 class EndCounts(NamedTuple):
-    """The modes of the two ends; null if they were not requested."""
+    """Modes at start and goal; null if they were not requested."""
 
     start: ModeCount | None
     goal: ModeCount | None
@@ -145,15 +145,15 @@ class EndCounts(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Candidate(Value):
-    """What is known about a set of legs; None for what was not computed, because the set was discarded before or was
-    not ``examined``: then it is neither kept nor discarded."""
+    """Set of legs with its results; None for what was not computed, because the set was discarded or not ``examined``.
+    A set that was not examined is neither kept nor discarded."""
 
     legs: Recorded[tuple[str, ...]]
     verdict: Annotated[str, Word]
     discarded: Recorded[str | None] = None
     errors: PoseErrors | None = None
     seen: Recorded[Mapping[str, float] | None] = None
-    """The least part of each of its legs that the camera sees at start and goal, after a run all along it."""
+    """Smallest visible fraction of each leg at start and goal; after a run, along it."""
     start_modes: ModeCount | None = None
     goal_modes: ModeCount | None = None
     aspect: Recorded[Decision | None] = None
@@ -163,13 +163,13 @@ class Candidate(Value):
 
     @property
     def rank(self) -> tuple[float, ...]:
-        """What the best of the examined sets has least of: other poses that attract, certified radius, then ``order``;
-        sets whose endings were not sought come last."""
+        """Sort key of examined sets: other stable equilibria, proved attraction radius, then ``order``; sets without a
+        search for equilibria come last."""
         return (*(LoopEnds(None, None) if self.equilibria is None else self.equilibria).order, *self.order)
 
     @property
     def order(self) -> tuple[float, float, int]:
-        """What the best set has least of: position error, orientation error, legs."""
+        """Sort key: position error, orientation error, number of legs."""
         if self.errors is None:
             return np.inf, np.inf, len(self.legs)
         return self.errors.position.largest, self.errors.orientation.largest, len(self.legs)
@@ -182,7 +182,7 @@ class Candidate(Value):
 
 
 class SightRecord(NamedTuple):
-    """A camera: the link that carries it, its pose in the link's frame, its focal length (pixels)."""
+    """Camera: link that carries it, pose in the link's frame, focal length (pixels)."""
 
     link: str
     pose: Annotated[Array, list[list[float]]]
@@ -190,7 +190,7 @@ class SightRecord(NamedTuple):
 
 
 class Unexamined(TypedDict):
-    """How many sets were not examined, and why."""
+    """Number of sets that were not examined, and the reason."""
 
     count: int
     reason: str | None
@@ -198,39 +198,54 @@ class Unexamined(TypedDict):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Selection(Result, shown_as="select"):
-    """All sets of legs up to a size for one displacement: the kept ones by their ``rank``, those not examined, the most
-    accurate at the goal first, then the discarded ones."""
+    """Sets of legs up to a size, ranked for one displacement.
+
+    Parameters
+    ----------
+    setup
+        Robot with observations and samples.
+    start, goal
+        Poses (m, rad, base coordinates).
+    candidates
+        Sets: the kept ones by rank, those not examined (most accurate first), the discarded ones.
+    bounds
+        Measurement bounds of the observations.
+    visible_from
+        Camera, None without one.
+    left
+        Reason why sets were not examined, None if all were.
+    """
 
     setup: Annotated[ObservedRobot, As(flat=True, without=("observed",))]
     start: Recorded[Pose]
     goal: Recorded[Pose]
     candidates: Annotated[tuple[Candidate, ...], As("sets")]
     bounds: MeasurementBounds
-    """How wrong each measurement may be."""
+    """Measurement bounds of the observations."""
     visible_from: CameraView | None
     left: str | None
-    """Why sets were not examined, None where all were."""
+    """Reason why sets were not examined, None if all were."""
 
     def headline(self) -> str:
-        """The robot, and the set that is best."""
+        """Robot and best set."""
         best = f"best {', '.join(self.kept[0].legs)}" if self.kept else "none is kept"
         more = f", {len(self.unexamined)} not examined" if self.unexamined else ""
         return f"{self.setup.robot.name}: {len(self.candidates)} sets, {len(self.kept)} kept{more}, {best}"
 
     @property
     def kept(self) -> tuple[Candidate, ...]:
-        """The sets that were examined and not discarded."""
+        """Sets that were examined and not discarded."""
         return tuple(each for each in self.candidates if each.examined and each.discarded is None)
 
     @property
     def unexamined(self) -> tuple[Candidate, ...]:
-        """The sets for which it is not known whether they would be kept."""
+        """Sets that were neither kept nor discarded."""
         return tuple(each for each in self.candidates if not each.examined)
 
     @property
     @recorded()
     def fewer(self) -> str | None:
-        """Why the best set serves better than one with more legs, None if that is not seen."""
+        """Explanation why the best set ranks above one with more legs, None if it does not."""
         known = [(each.legs, each.equilibria) for each in self.kept if each.equilibria is not None]
         return fewer_are_better(known[0], known[1:]) if known and known[0][0] == self.kept[0].legs else None
 
@@ -244,7 +259,7 @@ class Selection(Result, shown_as="select"):
     @property
     @recorded(As("sight"))
     def sight_record(self) -> SightRecord | None:
-        """The camera; None where none was asked for."""
+        """Camera, None without one."""
         eye = self.visible_from
         return None if eye is None else SightRecord(eye.reference, eye.camera.place, eye.camera.focal)
 
@@ -279,25 +294,51 @@ def select(
     criteria: Criteria,
     seed: Seed = 0,
 ) -> Selection:
-    """Which legs to watch for a motion from start to goal: all sets, ranked by where else the loop may end and by
-    accuracy, and why the others are discarded.
+    """Legs to observe for a motion from start to goal: sets ranked by other stable equilibria and by accuracy.
 
-    All sets of legs, or of what is observed, for the displacement from ``start`` to ``goal``, ranked by how many
-    poses besides the goal were found to attract the loop, by the certified radius (radii within one power of two are
-    equal), then by the largest position error at the goal for cones about the directions (``cone``: the half-angle for
-    all, or one per leg, by default 0.1°; MMT A.2) and ``noise`` of other observations (as ``0.3px,1mm,0.1deg``).
+    A set is discarded if it leaves platform dof unobserved; if start or goal is singular, beyond joint limits or
+    behind a camera; if the camera of ``visible_from`` sees too little of a leg; if start and goal are proved to lie
+    in different aspects; or if the outcome of a simulated run is not the goal.
 
-    The fields of :class:`Criteria` can be given by their names: ``size``, ``examine``, ``endings``, ``runs``,
-    ``visible_from``, ``focal``. The sets are those of the legs or links ``observe`` and of what else the file or
-    ``sensor`` observes, by default of all legs. A set is discarded if it does not see every freedom, if an end is
-    singular or beyond joint limits, or something is behind its camera there, if the camera (``sight``) sees too little
-    of a leg, if start and goal are proved to lie in different aspects, or if a simulated run ends elsewhere. Modes,
-    aspects and endings are computed for the ``examine`` most accurate sets (endings for ``endings`` of them; the radius
-    only for directions of segments); the others are neither kept nor discarded. Runs are made from the best set on,
-    until ``runs`` of them have ended at the goal.
+    Parameters
+    ----------
+    robot
+        Mechanism, observed robot, path or name.
+    observe, camera, sensor
+        As for :func:`hrsynth.observe`; the sets are taken from these observations (default: all legs).
+    start, goal
+        Poses, such as ``x=0.1,phi=20deg`` (m, rad), in base coordinates.
+    cone
+        Half-angle of the cones about the directions (rad, or text with ``deg``), for all or one per leg; default 0.1°.
+    noise
+        Largest errors of other observations, such as ``0.3px,1mm,0.1deg``.
+    criteria
+        Fields of :class:`Criteria`, also by their names: ``size``, ``examine``, ``equilibria``, ``runs``,
+        ``visible_from``, ``focal``.
+    seed
+        Seed of the random configurations.
 
-    Raises ``BadRequest``, ``PoseNotReached``.
+    Returns
+    -------
+    Selection
+        Sets: the kept ones by rank, those not examined, the discarded ones with the reason.
 
+    Raises
+    ------
+    BadRequest
+        For invalid options.
+    PoseNotReached
+        If start or goal is not reached.
+
+    Notes
+    -----
+    Rank (MMT A.2): number of stable equilibria found besides the goal; proved attraction radius (radii within one
+    power of two are equal); largest position error at the goal. Modes, aspects and equilibria are computed for the
+    ``examine`` most accurate sets, the radius for directions of segments only. Runs start with the best set and stop
+    after ``runs`` of them have reached the goal.
+
+    Examples
+    --------
     >>> hrsynth.select("3rrr_m1", start="x=0,y=0,phi=0", goal="x=0.02,y=0,phi=0")
     <Selection: 3rrr_m1: 7 sets, 1 kept, best 1, 2, 3>
     """
@@ -355,7 +396,7 @@ def _sight(setup: ObservedRobot, ends: Sequence[ClosedConfiguration], criteria: 
 
 @dataclass(frozen=True, eq=False)
 class _Work:
-    """What examines sets of legs between two configurations; none is begun after a point in time."""
+    """Examination of sets of legs between two configurations; none is begun after a deadline."""
 
     setup: ObservedRobot
     start: ClosedConfiguration
@@ -366,17 +407,17 @@ class _Work:
     seed: int
 
     def watching(self, legs: Sequence[str]) -> ObservedRobot:
-        """The setting with some of what is observed."""
+        """Setup with some of the observations."""
         return replace(self.setup, observed=tuple(o for o in self.setup.observed if o.leg in legs))
 
     def first(self, legs: tuple[str, ...]) -> Candidate:
-        """What is quickly said of a set: verdict, singular ends, sight, accuracy."""
+        """Evaluate the fast criteria of a set: verdict, singular ends, visibility, accuracy."""
         report("accuracy")
         setup = self.watching(legs)
         try:
             verdict = verdict_of(setup, legs, setup.samples)
             if verdict.verdict != CONTROLLABLE:
-                lost = f", not seen: {verdict.named}" if verdict.unobserved else ""
+                lost = f", not observed: {verdict.named}" if verdict.unobserved else ""
                 return Candidate(legs, verdict.verdict, verdict.verdict + lost)
             analysis = ConfigurationAnalysis.of(setup)
             ends = (("start", self.start), ("goal", self.goal))
@@ -434,9 +475,8 @@ class _Work:
             return ModeCount(None, None, False, str(error))
 
     def examine(self, candidates: Sequence[Candidate]) -> tuple[list[Candidate], str | None]:
-        """The candidates, of which as many as are to be examined, best first, have modes, aspects and endings, and from
-        the best of these on simulated runs until enough ended at the goal; why the others were left, None where there
-        are none."""
+        """Examine the candidates, best first: modes, aspects, equilibria, then simulated runs until enough reach the
+        goal. Also return why others were not examined, None without any."""
         most, runs = self.criteria.examine, self.criteria.runs
         found: list[Candidate] = []
         arrived = begun = 0
@@ -472,17 +512,17 @@ class _Work:
 
     @cached_property
     def rounds(self) -> tuple[Array, ...]:
-        """Starts from which the endings of all sets of directions are sought."""
+        """Starts of the search for equilibria of all sets of directions."""
         return self._rounds(self.setup)
 
     def _rounds(self, setup: ObservedRobot) -> tuple[Array, ...]:
-        """Starts at which all that a setting observes is in front of its camera."""
+        """Starts at which all observed points of a setup are in front of their cameras."""
         system = EquilibriumSearch.of(setup, self.goal).system
         homes = np.array([system.system.read(at.pose) for at in (self.goal, *setup.configurations)])
         return tuple(islice(starts(system, homes, self.seed, setup), SELECT_ROUNDS))
 
     def ran(self, candidate: Candidate) -> Candidate:
-        """The candidate with where its simulated run ends, and what the camera sees along it."""
+        """Add the outcome of the simulated run, and what the camera sees along it."""
         motion, mechanism = self.setup.motion, self.setup.mechanism
         start, goal = (motion.pose(at.pose(motion.link)) for at in (self.start, self.goal))
         camera = None if mechanism.reference == mechanism.base else mechanism.reference
@@ -496,11 +536,13 @@ class _Work:
             return replace(candidate, run=Decision("refused", str(error)), discarded=f"the run is refused: {error}")
         run = Decision(found.outcome, found.run_outcome.reason)
         if found.outcome != GOAL:
-            return replace(candidate, run=run, discarded=f"the simulated run ends in: {found.outcome} ({run.reason})")
+            return replace(
+                candidate, run=run, discarded=f"the outcome of the simulated run is {found.outcome} ({run.reason})"
+            )
         return self.look(replace(candidate, run=run), found.run.configurations)
 
 
 def _singular_at(name: str, posture: ConfigurationReport) -> str | None:
-    """Why a set is discarded whose hidden robot is singular at the start or the goal, None where it is regular."""
+    """Return why a set is discarded: its hidden robot is singular at start or goal; None where it is regular."""
     kind = TYPES.get(posture.hidden.state)
     return None if kind is None else f"the {name} is {kind}"

@@ -1,4 +1,4 @@
-"""What a camera sees of the legs: how much of each lies in its picture, hidden by no other leg (MMT A.2)."""
+"""Visibility of the legs in a camera: the fraction of each that lies in the image and is not hidden (MMT A.2)."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class CameraView(Value):
     rods: Mapping[str, Cylinder]
 
     def visible_parts(self, at: ClosedConfiguration) -> dict[str, float]:
-        """The part (0 to 1) of each rod's axis that lies in the picture and is not hidden by another rod."""
+        """Fraction (0 to 1) of each rod's axis that lies in the image and is not hidden by another rod."""
         X = at.pose(self.reference)
         ends = {leg: self.camera.project(X, at.pose, rod) for leg, rod in self.rods.items()}
         found = {}
@@ -48,7 +48,7 @@ class CameraView(Value):
         return {leg: min(each[leg] for each in found) for leg in self.rods}
 
     def _in_picture(self, points: Array) -> Flags:
-        """Which points (n, 3) of the camera's frame lie in the picture."""
+        """Mask (n,) of the points (n, 3) in the camera frame that lie in the image."""
         ahead = points[:, 2] > 0
         pixels = self.camera.pixels(np.where(ahead[:, None], points, 1.0))
         inside = np.all((pixels >= 0) & (pixels <= [self.camera.width, self.camera.height]), axis=1)
@@ -56,8 +56,8 @@ class CameraView(Value):
 
 
 def are_hidden(points: Array, segment: Array, radius: float) -> Flags:
-    """Which points (n, 3) a cylinder about a segment (2, 3) hides from the origin: the ray to the point comes nearer to
-    the segment than ``radius``, before the point."""
+    """Mask (n,) of the points (n, 3) that a cylinder about a segment (2, 3) hides from the origin: the ray to the point
+    passes the segment nearer than ``radius``, before the point."""
     a, d = segment[0], segment[1] - segment[0]
     length = float(d @ d)
     square = np.sum(points * points, axis=1)
@@ -75,12 +75,12 @@ def are_hidden(points: Array, segment: Array, radius: float) -> Flags:
 
 
 def camera_at(text: str, focal: float) -> Camera:
-    """The camera at a pose in the frame of the link that carries it: x right in the picture, y down, z ahead; 640 by
-    480 pixels, focal length in pixels. Raises ``BadRequest``."""
+    """Camera at a pose in the frame of the link that carries it: x right, y down, z ahead; 640 by 480 pixels, focal
+    length in pixels. Raises ``BadRequest``."""
     blank = of_focal(focal)
     wanted = Pose.parse(text)
     if None in (wanted.x, wanted.y, wanted.z) or wanted.rotation is None:
-        raise BadRequest("pose of the camera: a part is missing", text, "x, y, z and rpy; or auto")
+        raise BadRequest(f"--visible-from {text}: the pose is incomplete", remedy="Give x, y, z and rpy, or auto.")
     return replace(
         blank, place=pose([float(wanted.x or 0), float(wanted.y or 0), float(wanted.z or 0)], wanted.rotation)
     )
@@ -89,5 +89,5 @@ def camera_at(text: str, focal: float) -> Camera:
 def of_focal(focal: float) -> Camera:
     """A camera of a focal length in pixels, not placed; raises ``BadRequest``."""
     if not 0 < focal < np.inf:
-        raise BadRequest("focal length (pixels)", focal, "a positive number")
+        raise BadRequest("--focal (pixels)", focal, "a positive number")
     return Camera(np.eye(4), focal)

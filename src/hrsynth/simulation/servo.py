@@ -428,7 +428,7 @@ def require_sight(setup: ObservedRobot, law: Law, name: str, at: ClosedConfigura
             raise BadRequest(
                 f"{setup.robot.name}: {seen.kind} {seen.leg} is not in front of its camera at the {name}",
                 str(pose),
-                IN_SIGHT,
+                remedy=IN_SIGHT,
             )
 
 

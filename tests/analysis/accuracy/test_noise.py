@@ -210,8 +210,8 @@ def test_a_grid_is_its_single_poses_and_leaves_out_what_is_behind_the_camera(tmp
 @pytest.mark.parametrize(
     ("name", "given", "word"),
     [
-        ("point", {}, "how wrong the observations may be"),
-        ("point", {"cone": "0.1deg"}, "cones apply to directions only"),
+        ("point", {}, "the measurement bounds are missing"),
+        ("point", {"cone": "0.1deg"}, "applies to directions only"),
         ("direction", {"cone": "0.1deg"}, "not to position"),
         ("point", {"noise": "1mm"}, "in lengths"),
         ("point", {"noise": "0.3km"}, "not a number"),

@@ -57,10 +57,7 @@ def always(motion: str, freedoms: str, dof: int, because: str = "") -> tuple[str
     reason = f", because the P axes {because} are parallel" if because else ""
     return (
         motion,
-        (
-            f"always: {count} of {dof} freedoms {'is' if count == 1 else 'are'} never seen: {freedoms} (at the "
-            f"zero configuration){reason}"
-        ),
+        (f"always: {count} of {dof} dof never observed: {freedoms} (at the zero configuration){reason}"),
         "0",
     )
 
@@ -98,7 +95,7 @@ WHOLE = {
     "orthoglide": RAILS,
     "delta": TANGENTS,
     "3ruu": TANGENTS,
-    "3upu": parallel("u", "123", "the watched directions u1, u2, u3 are all parallel"),
+    "3upu": parallel("u", "123", "the observed directions u1, u2, u3 are all parallel"),
     "3rps": spatial("u"),
     "6pus": gram("spatial", SIX.format("p"), "123456"),
     "hexa": gram("spatial", SIX.format("τ"), "123456"),
@@ -238,7 +235,7 @@ def test_a_line_and_a_plane_are_told_by_their_vectors():
     for each in answer.examples:
         assert abs(each.pose.to_dict()["z"] - 0.3) < 1e-6
     both = singularities("3upu", "1", sensor=sensor, points=100)
-    assert both.words == "the watched directions u1 and the z axes z4 are parallel, also to the plane normal to r5"
+    assert both.words == "the observed directions u1 and the z axes z4 are parallel, also to the plane normal to r5"
 
 
 @pytest.mark.some(2, 2)
@@ -250,7 +247,7 @@ def test_as_many_freedoms_are_lost_everywhere_but_not_the_named_ones(robot: str,
     """At configurations of another walk: what is named is lost at the zero configuration, where the words put it."""
     answer = found(robot, legs)
     count, named = len(answer.verdict.unobserved), np.column_stack([each.twist for each in answer.verdict.unobserved])
-    assert answer.words.startswith(f"always: {count} of {answer.verdict.dof} freedoms")
+    assert answer.words.startswith(f"always: {count} of {answer.verdict.dof} dof never observed: ")
     assert "(at the zero configuration)" in answer.words
     start, scale = answer.setup.all_samples.start, np.repeat([1 / answer.setup.mechanism.length, 1.0], 3)[:, None]
     seen = []

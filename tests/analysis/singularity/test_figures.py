@@ -65,7 +65,7 @@ def test_the_rank_is_lost_there_and_full_a_centimetre_away(case: tuple[str, ...]
 @pytest.mark.some(2)
 @pytest.mark.parametrize("case", CASES)
 def test_the_oracle_sees_the_same_lost_freedom(case: tuple[str, ...]) -> None:
-    """In maximal coordinates, without the engine: one twist of the platform that keeps the watched directions."""
+    """In maximal coordinates, without the engine: one twist of the platform that keeps the observed directions."""
     found = answer(*case)
     observation_model = found.observation_model
     for each in examples(*case):

@@ -277,12 +277,12 @@ def test_a_plane_whose_poses_depend_on_each_other_says_so() -> None:
     ("robot", "plane", "words"),
     [
         ("delta", "phi=0.1", "cannot change phi"),
-        ("delta", "x=0,y=0", "this one leaves z"),
-        ("3rrr_m1", "x=0,y=0", "this one leaves phi"),
+        ("delta", "x=0,y=0", "must be free, here z"),
+        ("3rrr_m1", "x=0,y=0", "must be free, here phi"),
         ("delta", "z=abc", "z is not a number"),
-        ("hexaglide", None, "has no locus"),
-        ("3prp", None, "has no locus"),
-        ("3ppr_m1", None, "has no locus"),
+        ("hexaglide", None, "has no singularity locus"),
+        ("3prp", None, "has no singularity locus"),
+        ("3ppr_m1", None, "has no singularity locus"),
     ],
 )
 def test_planes_that_are_none(robot: str, plane: str | None, words: str) -> None:

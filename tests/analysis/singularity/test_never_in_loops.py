@@ -132,7 +132,7 @@ def test_a_crank_at_rest_lets_its_rocker_move_at_a_dead_point(real: bool, tmp_pa
     assert not answer.condition.never
 
 
-@pytest.mark.parametrize("see", ["inclination:r0/0.3,0.5,0.8", "position:r0@0.1,0.2,0.3"])
+@pytest.mark.parametrize("sensor", ["inclination:r0/0.3,0.5,0.8", "position:r0@0.1,0.2,0.3"])
 @pytest.mark.slow
 def test_other_observations_of_a_legs_link_may_fail_at_special_poses(sensor: str, tmp_path: Path):
     """The rod of a U joint turns about the vertical where this lies in the plane of the joint's axes."""

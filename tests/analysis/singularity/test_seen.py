@@ -79,7 +79,7 @@ def test_four_points_are_on_all_danger_cylinders() -> None:
 
 @pytest.mark.some(2)
 @pytest.mark.parametrize(
-    ("see", "words"),
+    ("sensor", "words"),
     [
         (LINES, "the normals n4, n5, n6 are parallel to one plane"),
         (
@@ -107,11 +107,11 @@ def test_points_on_one_line() -> None:
 
 
 @pytest.mark.parametrize(
-    ("see", "words", "expression"),
+    ("sensor", "words", "expression"),
     [
         (
             LINES,
-            "the images of the lines meet in a point, or C and the feet of its perpendiculars on the lines",
+            "the images of the lines meet in a point, or C and the footpoints of its perpendiculars on the lines",
             "det(e1, e2, e3)*det(n1, n2, n3)",
         ),
         pytest.param(
@@ -143,22 +143,22 @@ def test_closed_conditions(sensor: list[str], words: str, expression: str) -> No
 
 @pytest.mark.some(0, 5)
 @pytest.mark.parametrize(
-    ("robot", "camera", "see", "words"),
+    ("robot", "camera", "sensor", "words"),
     [
         (
             "gough_stewart",
             EYE,
             [*POINTS[:2], LINES[0]],
-            "along r2 and B3 normal to n3, and turns it about a normal of e3",
+            "along r2 and B3 normal to n3, and rotates it about a normal of e3",
         ),
-        ("gough_stewart", EYE, [POINTS[0], *LINES[1:]], "and turns it about the normal of e2, e3"),
+        ("gough_stewart", EYE, [POINTS[0], *LINES[1:]], "and rotates it about the normal of e2, e3"),
         (
             "gough_stewart",
             EYE,
             [x.replace("image_line", "edge") + "/0.005" for x in LINES],
             "feet of its perpendiculars",
         ),
-        ("gough_stewart", EYE, ["circle:platform@0.1,0,0/1,0,0", POINTS[1]], "leaves B1 at rest and moves B2 along r2"),
+        ("gough_stewart", EYE, ["circle:platform@0.1,0,0/1,0,0", POINTS[1]], "leaves B1 fixed and moves B2 along r2"),
         (
             "gough_stewart",
             [EYE, "other=base@-0.3,0.2,-0.2"],
@@ -188,7 +188,7 @@ def test_words_expression_and_rank_agree(robot: str, camera: str | list[str], se
 
 @pytest.mark.some(1)
 @pytest.mark.parametrize(
-    "see",
+    "sensor",
     [
         ["image_circle:platform@0.1,0,0.1/0,1,1/0.05", "point:platform@0,0.1,0"],
         ["line:platform@0.1,0,0.1/0,1,1", "distance:platform@0,0.1,0", "depth:platform@0.3,0,0"],
@@ -220,7 +220,7 @@ def slider_crank() -> Mechanism:
 @pytest.mark.slow
 @pytest.mark.some(1)
 @pytest.mark.parametrize(
-    ("see", "camera"),
+    ("sensor", "camera"),
     [
         ("distance:platform@0,0,0", "eye=base@-0.1,0.2,0"),
         ("encoder:slide", None),

@@ -1,4 +1,4 @@
-"""How far the platform can be off: the error maxima at poses, or over a plane, line or box of poses (MMT A.1)."""
+"""Pose accuracy: error maxima at poses, or over a plane, line or box of poses (MMT A.1)."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ WORST = 3
 
 
 class Cone(NamedTuple):
-    """A watched direction, and the half-angle of the cone about it."""
+    """An observed direction and the half-angle of the cone about it."""
 
     leg: str
     link: str
@@ -40,7 +40,7 @@ class Cone(NamedTuple):
 
 
 class SampledErrors(NamedTuple):
-    """The errors at a pose."""
+    """Errors at a pose."""
 
     errors: Annotated[PoseErrors, FLAT]
     sampled: NonlinearCheck | None
@@ -48,8 +48,23 @@ class SampledErrors(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Accuracy(Result, shown_as="accuracy"):
-    """The error maxima for cones about the observed directions, and for noise of other observations: at single poses,
-    over a grid, and, if requested, what samples of true errors give (None otherwise)."""
+    """Error maxima at poses or over a grid, for given measurement bounds.
+
+    Parameters
+    ----------
+    setup
+        Robot with observations and samples.
+    bounds
+        Measurement bounds of the observations.
+    poses
+        Errors at single poses (m, rad).
+    sampled
+        Nonlinear check of each pose, None if it was not requested.
+    field
+        Errors over a grid, None without one.
+    swept
+        File to which a grid was written, None without one.
+    """
 
     setup: Annotated[ObservedRobot, FLAT]
     bounds: MeasurementBounds
@@ -57,7 +72,7 @@ class Accuracy(Result, shown_as="accuracy"):
     sampled: tuple[NonlinearCheck | None, ...]
     field: Annotated[ErrorMap | None, FLAT]
     swept: Annotated[SweptErrors | None, FLAT] = None
-    """What is in a file, where a grid was swept to one."""
+    """Content of the file to which a grid was written."""
 
     @property
     def cones(self) -> Array:
@@ -132,7 +147,7 @@ def accuracy(
         option(f"A pose, such as x=0.02,y=0.1,z=-0.7; {POSES}", "POSE", kind=list[str]),
     ] = (),
     plane: Annotated[
-        PoseLike | None, option("Plane of poses, such as z=-0.7, as far as it is reached.", "PART=VALUE")
+        PoseLike | None, option("Plane of poses, such as z=-0.7; only reachable poses count.", "PART=VALUE")
     ] = None,
     grid: Annotated[
         Grid | str | None,
@@ -151,39 +166,75 @@ def accuracy(
     into: str | Path | None = None,
     seed: Seed = 0,
 ) -> Accuracy:
-    """How far the platform can be off if what is observed is off by given amounts.
+    """Largest pose error of the platform for given errors of the observations.
 
-    The largest position and orientation error of the platform over all errors of what is observed, to first order
-    (docs/pages/proofs.md, section 10; MMT A.1): max over unit w of Σ ψ_i ‖(J_i P_i)ᵀ w‖, J = M^{T+}.
+    Parameters
+    ----------
+    robot
+        Mechanism, observed robot, path of a file, name of a shipped robot, or ``example:NAME``.
+    observe
+        Leg labels or link names; default: what the file observes, else all legs.
+    camera
+        Link that carries the camera (default: the base), or named cameras ``NAME=LINK@x,y,z/r,p,y`` (m, rad).
+    sensor
+        Other observations, ``[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius`` (m, link frame).
+    cone
+        Half-angle of the cones about the directions (rad, or text with ``deg``), for all or one per leg.
+    noise
+        Largest errors of other observations (also of directions without a cone), such as ``0.3px,1mm,0.1deg``.
+    at, plane, grid
+        Poses (m, rad, base coordinates): single ones; a plane, as far as it is reached, with ``steps`` poses a side; or
+        a grid. Default: the zero configuration. Free parts of a grid keep their values at the zero configuration if
+        every leg is a known subproblem.
+    nonlinear
+        Number of errors that are tried without linearisation at each single pose, or at the worst poses of a grid.
+    into
+        File .npy to which the errors (m, rad) of a plane or grid of any size are written part by part; the same call
+        continues an interrupted sweep.
+    seed
+        Seed of the random configurations.
 
-    ``cone`` is the half-angle of the cones about directions, one for all legs or one per leg; ``noise`` gives the
-    errors of other kinds, as ``0.3px,1mm,0.1deg`` (also of directions without a cone). The poses are ``at``, those over
-    ``plane`` (as far as it is reached, ``steps`` poses a side), or those over ``grid``; default: the zero
-    configuration. In a grid free parts stay as at the zero configuration if the legs are known subproblems. The
-    platform comes to rest where ``servo`` does; poses of a grid at which something is not in front of its camera are
-    left out. ``nonlinear`` true errors are tried at each single pose, in a grid at its worst poses. ``into`` a file
-    .npy, the errors (m, rad) of a plane or grid of any size are written part by part; the same call continues an
-    interrupted sweep. ``observe``, ``camera`` and ``sensor`` are as for ``derive``.
+    Returns
+    -------
+    Accuracy
+        Position (m) and orientation error (rad) at poses or over the grid. Poses of a grid at which something observed
+        is not in front of its camera are left out.
 
-    Raises ``BadRequest`` for unknown names, for invalid cones, if not every freedom is seen (the error is infinite
-    everywhere) or something is behind its camera; ``PoseNotReached``, ``NoReachablePose``.
+    Raises
+    ------
+    BadRequest
+        For unknown names, invalid cones, unobserved platform dof (the error is infinite at every pose), or something
+        observed behind its camera.
+    PoseNotReached, NoReachablePose
+        If a pose, or all of a grid, is not reached.
 
+    Notes
+    -----
+    First order (docs/pages/proofs.md, section 10; MMT A.1): max over unit w of Σ ψ_i ‖(J_i P_i)ᵀ w‖, J = M^{T+}. The
+    platform converges where ``servo`` does.
+
+    Examples
+    --------
     >>> hrsynth.accuracy("3rrr_m1", cone="0.1deg", at="x=0,y=0,phi=0")
-    <Accuracy: 3rrr_m1, watching 1, 2, 3: 0.414 mm at x=0,y=0,z=0,phi=0deg>
+    <Accuracy: 3rrr_m1, observing 1, 2, 3: 0.414 mm at x=0,y=0,z=0,phi=0deg>
     """
     wanted: list[AskedPose] = asked_poses(at)
     if plane is not None and grid is not None:
-        raise BadRequest("both a plane and a grid are given", f"{plane} and {grid}", "one of them")
+        raise BadRequest(f"--plane {plane}: cannot be combined with --grid {grid}", remedy="Omit one.")
     if steps is not None and plane is None:
-        raise BadRequest("poses a side", steps, "only of a plane")
+        raise BadRequest(f"--steps {steps}: applies to a plane only", remedy="Give --plane, or omit --steps.")
     if nonlinear < 0:
-        raise BadRequest("number of samples", nonlinear, "none or more")
+        raise BadRequest("--samples", nonlinear, "0 or more")
     if into is not None:
         require_file(into)
         if plane is None and grid is None:
-            raise BadRequest("only a plane or a grid is written", str(into), "a plane or a grid as well")
+            raise BadRequest(
+                f"{into}: only errors over a plane or grid can be written", remedy="Add --plane or --grid."
+            )
         if nonlinear and not wanted:
-            raise BadRequest("samples at the worst poses of a file", nonlinear, "samples at single poses")
+            raise BadRequest(
+                f"--samples {nonlinear}: cannot be combined with an array file", remedy="Use single poses (--at)."
+            )
     held = None if plane is None else as_pose(plane)
     cells = None if grid is None else Grid.parse(grid, LARGEST_FIELD if into is None else LARGEST_SWEEP)
     setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed).telling(wanted)
@@ -213,27 +264,28 @@ def accuracy(
 
 
 def errors_at(setup: ObservedRobot, blur: MeasurementBounds, at: ClosedConfiguration) -> PoseErrors:
-    """The error maxima at a closed configuration; raises ``BadRequest`` where something is behind its camera."""
+    """Return the error maxima at a closed configuration; raises ``BadRequest`` if something observed is behind its
+    camera."""
     motion, observation_model = setup.motion, setup.samples.observation_model
     pose, lost = motion.pose(at.pose(motion.link)), unseen(at, observation_model)
     if lost is not None:
         raise BadRequest(
-            f"{setup.robot.name}: {lost.kind} {lost.leg} is not in front of its camera", str(pose), IN_SIGHT
+            f"{setup.robot.name}: {lost.kind} {lost.leg} is not in front of its camera at {pose}", remedy=IN_SIGHT
         )
     return error_maxima(at, observation_model, blur, pose)
 
 
 def sees_all(setup: ObservedRobot, otherwise: str = "the error is infinite at every pose, ") -> None:
-    """Raise ``BadRequest`` where the observed legs do not see all of the platform's freedoms, saying what follows."""
+    """Raise ``BadRequest`` unless all platform dof are observed; ``otherwise`` begins its message."""
     verdict = verdict_of(setup, setup.labels, setup.samples)
     if verdict.unobserved:
         what, cure = (
-            ("the legs do", "legs that make")
+            ("the legs do", "legs")
             if all(each.by_segment for each in setup.observed)
-            else ("what is observed does", "observations that make")
+            else ("what is observed does", "observations")
         )
         raise BadRequest(
-            f"{setup.robot.name}: {otherwise}{what} not see {verdict.named}",
+            f"{setup.robot.name}: {otherwise}{what} not determine {verdict.named}",
             ", ".join(setup.labels),
-            f"{cure} it controllable (hrsynth legs lists them, hrsynth advise what else to measure)",
+            remedy=f"Choose {cure} that make it controllable (hrsynth legs, hrsynth advise).",
         )

@@ -1,11 +1,10 @@
-"""The pose at which a controller rests when its directions are wrong, followed from the pose where they are right.
+"""Equilibrium of a servo loop with wrong directions, followed from the pose at which they are right.
 
-The law rests at critical points of F = ½ Σ ‖u_i × û_i‖² over the closed configurations (proofs.md 11), of other kinds
-of observations with the error e_i of each kind. û_i(s) is u_i turned by the part s of its error. At s = 0 the pose
-itself is a strict minimum, F = 0, where all freedoms are seen; by
-the implicit function theorem it goes on as one smooth curve of strict minima while the Hessian of F is positive
-definite. The curve is followed by Newton steps with the whole Hessian, not that of Gauss and Newton, which need not
-converge where errors are large.
+The equilibria are critical points of F = ½ Σ ‖u_i × û_i‖² over the closed configurations (proofs.md 11), for other
+observations with the error e_i of each kind. û_i(s) is u_i rotated by the fraction s of its error. At s = 0 the pose
+is a strict minimum, F = 0, if all platform dof are observed. By the implicit function theorem it continues as one
+smooth curve of strict minima while the Hessian of F is positive definite. The curve is followed by Newton steps with
+the whole Hessian; that of Gauss and Newton need not converge for large errors.
 """
 
 from __future__ import annotations
@@ -38,9 +37,9 @@ Wanted = Callable[[float], Values]
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A curve of best fits: the configurations on it, up to the part ``reached`` of the error, the smallest singular
-    value of Mᵀ met, and how it ended: at the whole error (``fit``), where the minimum becomes flat, which is where a
-    controller slips away (``ends``), or where the solver gave up (``not found``)."""
+    """Curve of best fits: configurations up to the fraction ``reached`` of the error, smallest singular value of Mᵀ on
+    it, and its end: the whole error (``fit``), a flat minimum from which a controller drifts away (``ends``), or a
+    failed solver (``not found``)."""
 
     way: tuple[ClosedConfiguration, ...]
     reached: float
@@ -83,8 +82,8 @@ class _Bowl:
         return np.asarray((H + H.T) / 2)
 
     def minimum(self, H: Array, wanted: Values, guess: Array) -> ClosedConfiguration | None:
-        """The critical point next to ``guess`` (n,) by Newton steps with the Hessian H of y = 0, its part JᵀJ taken
-        anew at each point; None where they do not contract, or lead further away than the guess did."""
+        """Return the critical point near ``guess`` (n,) by Newton steps with the Hessian H of y = 0, its part JᵀJ
+        computed anew at each point; None if they do not contract, or lead further away than the start."""
         y, at, last = guess, self.chart.at(guess, self.at.q), float(np.linalg.norm(guess))
         J = self.errors(self.at, wanted)[1]
         rest = H - J.T @ J

@@ -1,4 +1,4 @@
-"""The error maxima over a grid of poses: by the batch where it knows all legs, else from one pose to the next."""
+"""Error maxima over a grid of poses: by the batch if every leg is a known subproblem, else from pose to pose."""
 
 from __future__ import annotations
 
@@ -33,17 +33,17 @@ Flags = NDArray[np.bool_]
 PART = 25_000
 """Poses, at least, that are evaluated between two signs of progress."""
 SPOTS = 10
-"""Poses of a grid at which the batch is held against Pinocchio."""
+"""Number of poses of a grid at which the batch is compared with Pinocchio."""
 FINE, COARSE = 201, 41
 """Poses a side of a plane by the batch, and one by one."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ErrorField(Value):
-    """Poses of a sweep, in any number: whether each is reached, the largest position (m) and orientation error (rad),
-    the determinant of the directions' rates (None where they are not as many as freedoms), the smallest singular value
-    of Mᵀ; NaN where not reached, all (n,). ``gap`` bounds how much too large an error may be, relative; ``curve`` gives
-    pieces (k, 2, 2) of the curve of singular poses, of poses of a plane that were found one by one (else None)."""
+    """Errors at poses of a sweep, all (n,), NaN where not reached: position (m), orientation (rad), determinant of the
+    directions' rates (None unless there are as many as dof), smallest singular value of Mᵀ. ``gap`` bounds the relative
+    overestimate; ``curve`` has pieces (k, 2, 2) of the singular curve for poses of a plane that were solved one by one
+    (else None)."""
 
     reached: Flags
     position: Array
@@ -65,10 +65,10 @@ class SpotChecks(Value, all_recorded=True):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ErrorMap(Value):
-    """The error maxima over a grid, in its shape: position (m) and orientation (rad), NaN where no pose is reached,
-    infinite where a freedom is lost. ``smallest_at`` gives the smallest singular value of Mᵀ (n,) at other poses of the
-    same grid (values of its axes (n, ndim)); None where poses are found one by one. ``dependent`` says that parts of
-    these poses depend on each other, where some are not reached."""
+    """Error maxima over a grid, in its shape: position (m) and orientation (rad), NaN where no pose is reached,
+    infinite where a platform dof is unobserved. ``smallest_at`` evaluates the smallest singular value of Mᵀ (n,) at
+    other poses of the grid (values of its axes (n, ndim)); None for poses solved one by one.
+    ``dependent`` states that parts of these poses depend on each other, if some are not reached."""
 
     grid: Annotated[Grid, FLAT]
     reached: Annotated[Flags, Table]
@@ -107,14 +107,14 @@ class ErrorMap(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Mapper(Value):
-    """What evaluates grids for what is observed and how wrong that may be."""
+    """Evaluation of the errors over grids."""
 
     setup: ObservedRobot
     blur: MeasurementBounds
 
     @property
     def observation_model(self) -> ObservationModel:
-        """What is asked at each pose."""
+        """Observation model that is evaluated at each pose."""
         return self.setup.samples.observation_model
 
     @cached_property
@@ -128,7 +128,7 @@ class Mapper(Value):
         return batch if batch is not None and batch.complete and batch.coordinates.constant else None
 
     def plane(self, plane: Pose, steps: int | None) -> Grid:
-        """The grid over what is reached of a plane."""
+        """Return the grid over the reachable part of a plane."""
         all_samples, motion = self.setup.all_samples, self.setup.motion
 
         def met(first: ClosedConfiguration, coarse: Grid) -> Flags:
@@ -146,7 +146,9 @@ class Mapper(Value):
         name = self.setup.robot.name
         if self.batch is None and grid.size > LARGEST_GRID:
             raise BadRequest(
-                f"{name}: poses are found one by one; number of poses", grid.size, f"at most {LARGEST_GRID}"
+                f"{name}: the poses of this robot are solved one by one; number of poses",
+                grid.size,
+                f"at most {LARGEST_GRID}",
             )
         seen = self._one_by_one(grid) if self.batch is None else self._together(grid)
         dependent = (
@@ -178,7 +180,8 @@ class Mapper(Value):
 
     @staticmethod
     def errors(possible: Flags, part: Evaluation) -> tuple[Flags, Array, Array, float]:
-        """Of a part: where it is reached, the position and orientation errors there (NaN elsewhere), their gap."""
+        """For a part: mask of the reached poses, position and orientation errors there (NaN elsewhere), and their
+        gap."""
         reached, bounds = possible & part.reached, (part.position, part.orientation)
         largest = [np.where(reached, each.largest, np.nan) for each in bounds if each is not None]
         return reached, largest[0], largest[1], max(_gap(each.largest, each.lower) for each in bounds if each)
@@ -203,8 +206,8 @@ class Mapper(Value):
         )
 
     def parts(self, grid: Grid, cones: Array | None, places: Array | None = None) -> Iterator[tuple[Flags, Evaluation]]:
-        """Which poses of each part of a grid (or of other ``places`` of it) the platform can have at all, and what the
-        batch says of them; in NumPy where they do not make up for numba's start."""
+        """Return the poses of each part of a grid (or of other ``places`` of it) that the platform can have, with the
+        results of the batch; in NumPy if they are too few for numba's start."""
         count = grid.size if places is None else len(places)
         size = -(-count // max(1, count // PART))
         compiled = self.uses_numba(count, cones)
@@ -214,12 +217,12 @@ class Mapper(Value):
             yield self.part(grid, here, cones, compiled)
 
     def uses_numba(self, count: int, cones: Array | None) -> bool:
-        """Whether so many poses are done by numba."""
+        """Return True if so many poses are evaluated by numba."""
         assert self.batch is not None
         return self.batch.uses_numba(count, self.setup.labels, cones, POSES_FOR_NUMBA_ONCE)
 
     def part(self, grid: Grid, places: Array, cones: Array | None, compiled: bool) -> tuple[Flags, Evaluation]:
-        """Which poses at some places of a grid the platform can have at all, and what the batch says of them."""
+        """Return the poses at some places of a grid that the platform can have, with the results of the batch."""
         assert self.batch is not None
         X, possible = poses_over(self.setup.motion, grid, self.setup.robot.name, places)
         return possible, self.batch.evaluate(X, self.setup.labels, cones, compiled=compiled)
@@ -248,7 +251,7 @@ class Mapper(Value):
     def spots(
         self, grid: Grid, seen: ErrorField, seed: int, count: int = SPOTS, cells: NDArray[np.int64] | None = None
     ) -> SpotChecks:
-        """Hold the batch against Pinocchio at random poses of those that are ``seen``, all of a grid or those at some
+        """Compare the batch with Pinocchio at random poses of those that are ``seen``, all of a grid or those at some
         ``cells``; raises ``Disagreement``."""
         sizes = [np.where(np.isfinite(each), each, 0.0) for each in (seen.position, seen.orientation)]
         limits = [USUAL_ERROR * np.median(each[each > 0]) if (each > 0).any() else np.inf for each in sizes]

@@ -1,5 +1,4 @@
-"""By how much what is observed may be wrong: half-angles of cones as a user writes them, one for all directions or one
-a leg, and amounts of noise for each kind of observation.
+"""Measurement bounds: half-angles of cones about directions, and amounts of noise for other observations.
 
 To first order the errors of an observation are the images of unit balls: a cone is one ball, an image point a disc, an
 ellipse that is found by five of its points two balls.
@@ -45,15 +44,15 @@ def half_angles(cones: Cones, observed: Sequence[Observation]) -> Array:
     unknown = [name for name in given if name not in names]
     if unknown:
         raise BadRequest(
-            "a cone for something that is not observed",
-            unknown[0],
+            f"--cone {unknown[0]}: not observed",
+            None,
             "legs " + ", ".join(dict.fromkeys(o.leg for o in observed)),
         )
     found = []
     for o in observed:
         value = given.get(o.link, given.get(o.leg))
         if value is None:
-            raise BadRequest(f"leg {o.leg} has no cone", str(cones), EXAMPLE)
+            raise BadRequest(f"--cone {cones}: no angle for leg {o.leg}", remedy=f"Use {EXAMPLE}.")
         found.append(_require_angle(value, value))
     return np.array(found)
 
@@ -66,15 +65,15 @@ def _parse(text: str) -> float | dict[str, float]:
     for field in fields:
         name, equals, value = (piece.strip() for piece in field.partition("="))
         if not equals:
-            raise BadRequest("cones: not leg=angle", field, EXAMPLE)
+            raise BadRequest(f"--cone {field}: not of the form LEG=ANGLE", remedy=f"Use {EXAMPLE}.")
         if name in found:
-            raise BadRequest("cones: leg given twice", name, "once")
+            raise BadRequest(f"--cone: leg {name} is given twice", remedy="Omit one.")
         found[name] = _angle(value)
     return found
 
 
 def single_angle(cone: float | str) -> float:
-    """One half-angle (rad) for all that is observed; raises ``BadRequest``."""
+    """Return one half-angle (rad) for all observations; raises ``BadRequest``."""
     return _angle(cone, ANGLES) if isinstance(cone, str) else _require_angle(cone, cone)
 
 
@@ -83,31 +82,31 @@ def _angle(text: str, allowed: str = EXAMPLE) -> float:
     try:
         value = plain_number(digits)
     except ValueError:
-        raise BadRequest("cone: not a number", text, allowed) from None
+        raise BadRequest("--cone: angle", text, allowed) from None
     return _require_angle(value if digits == text else math.radians(value), text)
 
 
 def _require_angle(value: Any, shown: object) -> float:
     if isinstance(value, bool) or not (isinstance(value, Real) and 0 < float(value) < math.pi / 2):
-        raise BadRequest("half-angle of a cone", shown, ALLOWED)
+        raise BadRequest("--cone: half-angle", shown, ALLOWED)
     if value < NARROWEST_CONE:
-        raise BadRequest("half-angle of a cone", shown, f"at least {NARROWEST_CONE:g} (radians)")
+        raise BadRequest("--cone: half-angle", shown, f"at least {NARROWEST_CONE:g} (radians)")
     return float(value)
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorBalls:
-    """The first-order errors of what is observed at a configuration: for each ball the place of its observation, its
-    number among the observation's own, and the map (rows, 3) of it to all that is fed back (characteristic lengths).
-    Of directions ``fed`` is the value itself, else the error of a servo loop: rates (rows, n) come from those of values
-    by the ``slopes``, None where all are 1."""
+    """First-order errors of the observations at a configuration: for each ball the index of its observation, its number
+    there, and its map (rows, 3) to the regulated vector (characteristic lengths). For directions ``fed`` is the value
+    itself, else the error of a servo loop: its rates (rows, n) are those of the values times the ``slopes`` (None: all
+    1)."""
 
     balls: tuple[tuple[int, int], ...]
     maps: tuple[Array, ...]
     slopes: tuple[Array, ...] | None
 
     def rows(self, rates: Array) -> Array:
-        """The rates (rows, n) of what is fed back, of those of the values."""
+        """Return the rates (rows, n) of the regulated vector, from those of the values."""
         if self.slopes is None:
             return rates
         places = np.cumsum([0, *(slope.shape[1] for slope in self.slopes)])
@@ -116,32 +115,29 @@ class ErrorBalls:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MeasurementBounds(Value):
-    """By how much each observation may be wrong: the half-angle (rad) of the cone about each direction, (k,), zero for
-    what is no direction; ``amounts`` of noise by their units for those."""
+    """Measurement bounds of the observations: half-angle (rad) of the cone about each direction, (k,), zero for other
+    observations; ``amounts`` of noise by their units for those."""
 
     cones: Array
     noise: Noise | None = None
 
     @classmethod
     def of(cls, cone: Cones | None, noise: str | Noise | None, observed: Sequence[Observation]) -> MeasurementBounds:
-        """What a user says; raises ``BadRequest`` where nothing is said of a direction, or of anything else."""
+        """Parse a user's bounds; raises ``BadRequest`` if an observation has none."""
         amounts = Noise.read(noise)
         axes = [o for o in observed if isinstance(o, SeenAxis)]
         others = [o for o in observed if not isinstance(o, SeenAxis)]
         if cone is None and amounts is None:
             raise BadRequest(
-                "how wrong the observations may be is not given",
-                None,
-                "a cone about each direction, as --cone 0.1deg, or errors of what else is observed, as "
-                "--noise 0.1deg,0.3px,1mm",
+                "the measurement bounds are missing",
+                remedy="Give --cone 0.1deg for directions, or --noise 0.1deg,0.3px,1mm for other observations.",
             )
         if cone is not None and not axes:
-            raise BadRequest("cones apply to directions only", ", ".join(o.leg for o in observed), "--noise")
+            raise BadRequest("--cone: applies to directions only", remedy="Use --noise.")
         if others and amounts is None:
             raise BadRequest(
-                f"cones apply to directions only, not to {others[0].kind} {others[0].leg}",
-                str(cone),
-                "noise besides, as 0.3px or 1mm: --noise",
+                f"--cone {cone}: applies to directions only, not to {others[0].kind} {others[0].leg}",
+                remedy="Add --noise, such as 0.3px or 1mm.",
             )
         if amounts is not None:
             amounts.amounts_for(others if cone is not None else observed)
@@ -165,27 +161,27 @@ class MeasurementBounds(Value):
 
     @property
     def each(self) -> str:
-        """The word for the set in which one error lies."""
+        """Name of the set that contains an error."""
         return "cone" if self.noise is None else "error"
 
     @property
     def inside(self) -> str:
-        """Of what, and within what, all errors are considered."""
+        """Describe the errors that are considered, and their bounds."""
         return "of the directions inside their cones" if self.noise is None else "that the noise allows"
 
     def words(self, place: int, seen: Observation) -> str:
-        """How wrong one of the observations may be."""
+        """Describe the bound of one observation."""
         if isinstance(seen, SeenAxis):
             return f"within {np.degrees(self.cones[place]):.4g}°" if self.cones[place] else "exact"
         own = self.own(place, seen)
         return f"within {' and '.join(str(Noise(((unit, own[unit]),))) for unit in own)}" if own else "exact"
 
     def select(self, places: Sequence[int]) -> MeasurementBounds:
-        """That of some of the observations."""
+        """Return the bounds of some of the observations."""
         return MeasurementBounds(self.cones[list(places)], self.noise)
 
     def exact(self, observed: Sequence[Observation]) -> tuple[str, ...]:
-        """What has no error at all."""
+        """Return the observations without error."""
         return tuple(o.leg for i, o in enumerate(observed) if not self.own(i, o))
 
     def at(self, at: ClosedConfiguration, observation_model: ObservationModel) -> ErrorBalls:
@@ -217,7 +213,7 @@ class MeasurementBounds(Value):
         return ErrorBalls(tuple(balls), tuple(maps), slopes)
 
     def radii(self, balls: Sequence[tuple[int, int]]) -> Array:
-        """In what unit vectors of balls are told: cones in radians, others as parts of the ball."""
+        """Return the units of the balls' unit vectors: cones in radians, others as fractions of the ball."""
         return np.array([self.cones[i] or 1.0 for i, _ in balls])
 
     def wrong(
@@ -229,7 +225,7 @@ class MeasurementBounds(Value):
         way: Array,
         part: float,
     ) -> list[Array]:
-        """What is measured where values are off by a part of a ``way`` (balls, 3), told by :meth:`radii`."""
+        """Return the measured values with errors of a fraction of ``way`` (balls, 3), in units of :meth:`radii`."""
         found = list(values)
         shocks = np.zeros((len(observed), 2, 3))
         for (i, number), each in zip(balls.balls, way, strict=True):
@@ -253,11 +249,11 @@ def tilt(u: Sequence[Array] | Array, way: Array) -> Array:
     )
 
 
-IN_SIGHT = "a pose from which all is seen, or a camera whose z axis points at it"
+IN_SIGHT = "Choose a pose at which everything observed is visible, or point the camera's z axis at it."
 
 
 def unseen(at: ClosedConfiguration, observation_model: ObservationModel) -> Observation | None:
-    """What is not in front of its camera, or not in its picture, at a configuration."""
+    """Return an observation that is not in front of its camera, or outside its image, at a configuration; else None."""
     return next(
         (
             o

@@ -1,6 +1,6 @@
-"""The check of the linear law: measurements that are truly off, and the poses at which a controller rests with them.
+"""Check of the linear errors: equilibria of the servo loop with finite measurement errors.
 
-To first order such a pose is M^{T+} δu away. Near a singularity, and where errors are large, the two part.
+To first order such a pose differs by M^{T+} δu. Near a singularity, and for large errors, the two differ.
 """
 
 from __future__ import annotations
@@ -26,11 +26,10 @@ from .pose_errors import PoseErrors
 
 @dataclass(frozen=True, eq=False, repr=False)
 class NonlinearCheck(Value, all_recorded=True):
-    """What the robot truly does with ``count`` errors on the cones' borders, the linearly worst ones first, each led
-    there from none: the largest position (m) and orientation error (rad) met on these ways.
-
-    ``ended`` holds the part of its error at which each best fit becomes flat that does; ``not_found`` counts those that
-    the solver lost before. ``weakest`` is the smallest singular value of Mᵀ met, ``usual`` that at the pose."""
+    """Largest position (m) and orientation error (rad) for ``count`` finite errors on the borders of the cones, the
+    linearly worst ones first, each increased from zero. ``ended`` holds the fractions of the error at which best fits
+    become flat; ``not_found`` counts failed solutions. ``smallest_singular_value`` is that of Mᵀ on the way, ``usual``
+    that at the pose."""
 
     count: Annotated[int, As("samples")]
     position: Annotated[float, As("position_mm", scale=MM)]
@@ -42,7 +41,7 @@ class NonlinearCheck(Value, all_recorded=True):
 
     @property
     def missed(self) -> int:
-        """How many were not followed up to the whole error."""
+        """Number of errors that were not followed to their full size."""
         return len(self.ended) + self.not_found
 
 

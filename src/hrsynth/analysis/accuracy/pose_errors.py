@@ -1,6 +1,7 @@
-"""The error maxima at a closed configuration, from Pinocchio's relation there, with the directions that attain them.
+"""Error maxima at a closed configuration, from Pinocchio's relation there, with the directions that attain them.
 
-Of directions in cones, and of what else is observed (``cones``): the platform is where a servo loop comes to rest.
+The errors are those of directions in cones and of other observations (``cones``); the platform is at the equilibrium of
+the servo loop.
 """
 
 from __future__ import annotations
@@ -36,27 +37,26 @@ ASCENTS = 16
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ErrorEllipsoid(Value):
-    """The largest error in each direction of space, its extremes: ``largest`` with its unit direction (3,), ``least``
-    with its own, among the directions in which there are errors at all.
-
-    ``errors`` (k, 3) are the errors that give the largest one that was found, of directions in radians, else in the
-    balls that :class:`.MeasurementBounds` tells. Of three balls and more ``largest`` is an upper bound, which may be by
-    ``gap`` too large, as a part of the error that is attained. Where a freedom is lost ``largest`` is infinite and
-    ``errors`` is None; where there are no errors both are zero and the directions are None."""
+    """Largest and least error over the directions of space: ``largest`` with its unit direction (3,), ``least`` with
+    its own, among the directions in which there are errors at all. ``errors`` (k, 3) are the errors that give the
+    largest one found, for directions in radians, else in the balls of :class:`.MeasurementBounds`. With three balls
+    or more ``largest`` is an upper bound, at most ``gap`` (relative) above the attained error. If a platform dof is
+    unobserved ``largest`` is infinite and ``errors`` is None; without errors both are zero and the directions are
+    None."""
 
     largest: Annotated[float, Number, SCALED]
     direction: Annotated[Array | None, list[float] | None]
     least: Annotated[float, Number, SCALED]
     least_direction: Annotated[Array | None, list[float] | None]
     errors: Array | None
-    gap: Annotated[float, "by how much it may be too large, relative to what is attained"] = 0.0
+    gap: Annotated[float, "largest possible overestimate, relative to the attained error"] = 0.0
     single: bool = False
-    """Whether there are errors in one direction only."""
+    """True if there are errors in one direction only."""
 
     @property
     @recorded()
     def anisotropy(self) -> float | None:
-        """The largest error as multiple of the least; None where there is one direction only, or no finite error."""
+        """Ratio of the largest to the least error; None for one direction only, or no finite error."""
         if self.direction is None or self.single or not np.isfinite(self.largest):
             return None
         return self.largest / self.least
@@ -85,8 +85,8 @@ def reading(at: ClosedConfiguration, observation_model: ObservationModel) -> tup
 
 
 def maxima(at: ClosedConfiguration, observation_model: ObservationModel, blur: MeasurementBounds) -> Array:
-    """Upper and lower bounds (2, 2) of the largest position (m) and orientation error (rad) at a configuration, one in
-    each column; infinite where a freedom is lost."""
+    """Return upper and lower bounds (2, 2) of the largest position (m) and orientation error (rad) at a configuration,
+    one in each column; infinite if a platform dof is unobserved."""
     return np.stack(
         [
             np.full(2, np.inf) if part is None else np.ravel(bounds_of_maps(part.J[None], part.only))
@@ -99,15 +99,16 @@ def maxima(at: ClosedConfiguration, observation_model: ObservationModel, blur: M
 def largest_by_ascent(
     at: ClosedConfiguration, observation_model: ObservationModel, blur: MeasurementBounds
 ) -> tuple[float, float]:
-    """The largest position (m) and orientation error (rad) that an ascent from many views finds: as :func:`maxima`, but
-    a lower bound of it, where six legs are watched in a sixth of the time."""
+    """Return the largest position (m) and orientation error (rad) that an ascent from many views finds: a lower bound
+    of :func:`maxima`, in a sixth of the time for six legs."""
     position, orientation = (_axes(part, 1) for part in _parts(at, observation_model, blur))
     return _longest(position), _longest(orientation)
 
 
 def error_axes(at: ClosedConfiguration, observation_model: ObservationModel, blur: MeasurementBounds) -> Array | None:
-    """Three axes (3, 3), by rows, as long as the largest position errors (m) along them, the first along the largest
-    that an ascent finds, the next along the largest normal to it; None where a freedom is lost that moves it."""
+    """Return three axes (3, 3), by rows, as long as the largest position errors (m) along them, the first along the
+    largest that an ascent finds, the next along the largest normal to it; None if an unobserved dof moves the
+    position."""
     return _axes(next(_parts(at, observation_model, blur)), 3)
 
 
@@ -133,8 +134,8 @@ class ErrorMaps:
 def _parts(
     at: ClosedConfiguration, observation_model: ObservationModel, blur: MeasurementBounds
 ) -> Iterator[ErrorMaps | None]:
-    """Of position and orientation, None where a freedom is lost that moves it: δt = T (E R)⁺ E δy for rates R of the
-    values and twists T on one basis, E the slopes of what is fed back."""
+    """Return the maps of position and orientation errors, None if an unobserved dof moves it: δt = T (E R)⁺ E δy for
+    rates R of the values and twists T on one basis, E the slopes of the regulated vector."""
     rates, twists = reading(at, observation_model)
     errors = blur.at(at, observation_model)
     rows = errors.rows(rates)

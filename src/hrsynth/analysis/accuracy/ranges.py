@@ -1,4 +1,4 @@
-"""What errors in any number come to, part by part."""
+"""Ranges of errors, combined part by part."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from ...results import Value
 
 @dataclass(frozen=True)
 class ErrorRange(Value):
-    """Errors in any number: the least and the largest of those that the first order bounds (None: there are none), how
-    many are larger, how many infinite, and whether any is not zero."""
+    """Range of errors: the least and the largest of those that the first order bounds (None: there are none), the
+    numbers of larger and of infinite ones, and whether any is not zero."""
 
     least: Annotated[float | None, SCALED] = None
     largest: Annotated[float | None, SCALED] = None
-    slack: Annotated[int, "how many are larger"] = 0
+    slack: Annotated[int, "number of larger ones"] = 0
     infinite: Recorded[int] = 0
     moves: bool = False
 
@@ -49,8 +49,8 @@ class ErrorRange(Value):
 
 @dataclass(frozen=True)
 class Tally(Value):
-    """What the first poses of a sweep came to: how many were done, how many of them are reached, the ranges, the gap,
-    and of the part with the most that are reached how many and where it starts."""
+    """Summary of the first poses of a sweep: number done, number reached, ranges, gap, and the part with the most
+    reached poses (number and start)."""
 
     done: int = 0
     reached: int = 0
@@ -60,7 +60,7 @@ class Tally(Value):
     fullest: tuple[int, int] = (0, 0)
 
     def with_part(self, count: int, reached: int, position: ErrorRange, orientation: ErrorRange, gap: float) -> Tally:
-        """With one part more."""
+        """Return the summary with one part more."""
         return Tally(
             self.done + count,
             self.reached + reached,
@@ -72,7 +72,7 @@ class Tally(Value):
 
     @classmethod
     def parse(cls, line: str) -> Tally:
-        """What a line of the journal says."""
+        """Parse a line of the journal."""
         told = json.loads(line)
         ranges = {name: ErrorRange(**told[name]) for name in ("position", "orientation")}
         return cls(**{**told, **ranges, "fullest": tuple(told["fullest"])})

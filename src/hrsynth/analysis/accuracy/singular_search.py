@@ -1,4 +1,4 @@
-"""Singular poses of a plane where no determinant tells them: where the smallest singular value of Mᵀ falls to zero."""
+"""Search for singular poses of a plane without a determinant: zeros of the smallest singular value of Mᵀ."""
 
 from __future__ import annotations
 

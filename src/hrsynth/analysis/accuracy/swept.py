@@ -1,4 +1,4 @@
-"""The error maxima over a grid of any size, written to a file part by part; a sweep that was broken off goes on."""
+"""Error maxima over a grid of any size, written to a file part by part; an interrupted sweep is continued."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ from .ranges import ErrorRange, Tally
 
 ENDING, PART, JOURNAL = ".npy", ".part", ".journal"
 ROW = np.dtype([("position", "<f8"), ("orientation", "<f8")])
-"""What the file holds of a pose: the errors (m, rad), NaN where it is not reached, infinite where a freedom is lost."""
+"""Content of the file for a pose: errors (m, rad), NaN if it is not reached, infinite if a platform dof is
+unobserved."""
 
 
 class SweptCounts(NamedTuple):
@@ -61,28 +62,31 @@ class SweptErrors(Value):
     @property
     @recorded(As("swept"))
     def counts(self) -> SweptCounts:
-        """What is in the file."""
+        """File to which the errors are written."""
         tally = self.tally
         return SweptCounts(self.grid.size, tally.reached, self.before, tally.position, tally.orientation)
 
 
 def sweep_to(path: str | Path, mapper: Mapper, grid: Grid, seed: int) -> SweptErrors:
-    """Write the error maxima over a grid to ``path``, whole or not at all, and go on where the same sweep was broken
-    off; memory is that of one part.
+    """Write the error maxima over a grid to ``path``, whole or not at all, and continue an interrupted sweep.
+
+    The memory is that of one part.
 
     Raises
     ------
     BadRequest
-        For another ending than .npy, poses that are found one by one, a disk that is too small, another sweep to that
-        file: at work, or broken off.
+        For another suffix than .npy, poses that are solved one by one, a disk that is too small, or another sweep to
+        that file, running or interrupted.
     BuildStopped
-        Where the disk takes no more; what was written is kept.
+        If the disk is full; what was written is kept.
     NoReachablePose
-        Where no pose of the grid is reached.
+        If no pose of the grid is reached.
     """
     name, target = mapper.setup.robot.name, require_file(path)
     if mapper.batch is None:
-        raise BadRequest(f"{name}: poses are found one by one, not in parts", str(path), "another file, as map.csv")
+        raise BadRequest(
+            f"{path}: the poses of {name} are solved one by one, not in parts", remedy="Write a table, such as map.csv."
+        )
     cones = mapper.blur.cones
     asked = hashlib.sha256(
         repr(
@@ -110,7 +114,7 @@ def sweep_to(path: str | Path, mapper: Mapper, grid: Grid, seed: int) -> SweptEr
 
 
 def _spots(mapper: Mapper, grid: Grid, draft: _SweepDraft, tally: Tally, seed: int) -> SpotChecks:
-    """The file held against Pinocchio at random poses of it; where few of these are reached, of the part that is
+    """Check the file against Pinocchio at random poses; if few of these are reached, at those of the part that is
     reached most."""
     rng = np.random.default_rng(seed)
     start = tally.fullest[1]
@@ -126,16 +130,15 @@ def _spots(mapper: Mapper, grid: Grid, draft: _SweepDraft, tally: Tally, seed: i
 
 
 def require_file(path: str | Path) -> Path:
-    """Where the file will be; raises ``BadRequest``."""
+    """Return the path of the file; raises ``BadRequest``."""
     if as_path(path).suffix.lower() != ENDING:
-        raise BadRequest("errors are written part by part to an array", str(path), f"a file that ends in {ENDING}")
+        raise BadRequest("array of errors: name of the file", str(path), f"*{ENDING}")
     return require_writable(path)
 
 
 class _SweepDraft:
-    """The array of a grid that is being written, and its journal: what was asked, then a line a part. Both are on the
-    disk when a part counts as done; a last line that was torn is cut off, and a damaged one, found by its checksum,
-    does not count."""
+    """Array of a grid that is being written, and its journal: the request, then a line per part. Both are on the disk
+    when a part counts as done; a truncated last line is cut off, and a damaged one (by its checksum) does not count."""
 
     def __init__(self, target: Path, grid: Grid, asked: str, compiled: bool) -> None:
         self.target = target
@@ -161,7 +164,8 @@ class _SweepDraft:
         self._files.close()
 
     def _resume(self, asked: str, compiled: bool) -> tuple[bool, Tally]:
-        """Whether it is done by numba, and how far it came; raises ``BadRequest`` for another question's journal."""
+        """Return True if numba is used, and the progress so far; raises ``BadRequest`` for the journal of another
+        request."""
         content = self._lines.read()
         lines = content[: content.rfind(b"\n") + 1].splitlines()
         if not lines:
@@ -171,15 +175,14 @@ class _SweepDraft:
             told = json.loads(first or "")
             if told["asked"] != asked:
                 raise BadRequest(
-                    "another sweep to this file was interrupted",
-                    str(self.journal),
-                    "the same question, another file, or that journal removed",
+                    f"{self.journal}: journal of an interrupted sweep with other options",
+                    remedy="Repeat that command, write another file, or remove the journal.",
                 )
             done = next((Tally.parse(each) for each in reversed(parts) if each is not None), Tally())
             there = self.part.stat().st_size if self.part.exists() else 0
         except (ValueError, KeyError, TypeError, RecursionError):
             raise BadRequest(
-                "no journal of a sweep with checksums", str(self.journal), "another file, or that one removed"
+                f"{self.journal}: not the journal of a sweep", remedy="Write another file, or remove this one."
             ) from None
         return told["compiled"], done if there >= self._place(done.done) else Tally()
 
@@ -187,7 +190,12 @@ class _SweepDraft:
         """Write the heads of both, or cut off what is no whole part; raises ``BadRequest`` for a disk too small."""
         free, need = shutil.disk_usage(self.target.parent).free, self._whole - self.tally.done * ROW.itemsize
         if need > free:
-            raise BadRequest("the file takes more bytes than are free on the disk", need, f"at most {free}")
+            raise BadRequest(
+                f"{self.part}: size of the file in bytes",
+                need,
+                f"at most {free}",
+                remedy="Free disk space, or use fewer poses.",
+            )
         if not self.tally.done:
             self._rows.truncate(0)
             self._rows.write(self._head)
@@ -200,7 +208,7 @@ class _SweepDraft:
             self._lines.seek(0, os.SEEK_END)
 
     def _place(self, done: int) -> int:
-        """Where the row of a cell begins."""
+        """Return the offset of a cell's row."""
         return len(self._head) + done * ROW.itemsize
 
     def _line(self, text: str) -> None:

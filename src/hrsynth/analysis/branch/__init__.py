@@ -1,2 +1,1 @@
-"""From motors to joints: the branch of the zero configuration, proved over cells of motor coordinates
-(docs/pages/prove_a_branch.md)."""
+"""Branch of the zero configuration as a function of the motors, proved over cells (docs/pages/prove_a_branch.md)."""

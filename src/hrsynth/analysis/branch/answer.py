@@ -1,4 +1,5 @@
-"""What is proved of a robot's branch: cells of motor coordinates with affine tubes, how they meet, where they end."""
+"""Proved branch of a robot: cells of motor coordinates with affine tubes, their adjacency, and the ends of the
+proof."""
 
 from __future__ import annotations
 
@@ -15,8 +16,8 @@ from ...results import Result, Value
 from .loops import LoopSystem
 
 KEPT, PASSED, OPEN, UNSEEN = "kept", "passed", "undecided", "not looked at"
-"""What is proved of a limit over the cells."""
-BACK = "low and high of a box of all motors, no two of which give the platform one pose on the branch (proved)"
+"""Verdict on a joint limit over the cells."""
+BACK = "low and high of a box of all motors: no two motor positions in it give the same pose on the branch (proved)"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -35,9 +36,9 @@ class BranchCell(Value, all_recorded=True):
     slopes: Annotated[Array, Table, "one row per passive coordinate, one column per motor"]
     radius: Annotated[Array, list[float]]
     smallest_singular_value: Annotated[
-        float, "a lower bound of the smallest singular value of the loops' Jacobian over the tube"
+        float, "lower bound of the smallest singular value of the loop Jacobian over the tube"
     ]
-    neighbours: Annotated[tuple[int, ...], "cells with a common face, proved to hold the same closure there"] = ()
+    neighbours: Annotated[tuple[int, ...], "cells with a common face and the same closure there (proved)"] = ()
 
     @property
     def middle(self) -> Array:
@@ -45,7 +46,7 @@ class BranchCell(Value, all_recorded=True):
         return np.asarray((self.low + self.high) / 2)
 
     def holds(self, q: Array) -> bool:
-        """Whether motor coordinates (n,) lie in the cell."""
+        """Return True if motor coordinates (n,) lie in the cell."""
         return bool(np.all(self.low <= q) and np.all(q <= self.high))
 
     def at(self, q: Array) -> Array:
@@ -55,9 +56,9 @@ class BranchCell(Value, all_recorded=True):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Toggle(Value, all_recorded=True):
-    """A place where the proof ends, found in floating point: motors ``q`` (n,) of a part at which, as far as numbers
-    tell, the ``joints`` can move while all motors are held (a determinant vanishes); ``loops`` are those that they
-    close. Without joints: no such place was found, and the proof was given up for its ``reason``."""
+    """End of the proof, in floating point: motors ``q`` (n,) of a part at which the ``joints`` can move,
+    numerically, while all motors are fixed (a determinant vanishes); ``loops`` are those that they close. Without
+    joints: no such configuration was found, and the proof was given up for its ``reason``."""
 
     q: Annotated[Array, list[float], As("motors")]
     joints: tuple[str, ...]
@@ -101,19 +102,19 @@ class BranchPart(Value):
     proved: Annotated[
         tuple[Array, Array], Table, "low and high of a box about the zero configuration in the union of the cells"
     ]
-    volume_fraction: Annotated[float, "volume of all cells, as a share of the box"]
+    volume_fraction: Annotated[float, "volume of all cells, as a fraction of the box"]
     box_fraction: Recorded[float]
     cells: Recorded[tuple[BranchCell, ...]]
     toggles: Recorded[tuple[Toggle, ...]]
     turns: tuple[tuple[str, bool], ...]
-    closed_to: Annotated[float, "bound of the equations left out (characteristic lengths, pure numbers)"]
-    """Bound of the equations that were left out, over all tubes; 0 where they are proved to hold."""
+    closed_to: Annotated[float, "residual bound of the redundant equations (characteristic lengths, radians)"]
+    """Bound of the redundant equations, over all tubes; 0 if they are proved to hold."""
     redundant: Recorded[str]
-    """Why the equations that were left out hold; empty where none was."""
+    """Reason why the redundant equations hold; empty without any."""
 
     @property
     def in_cells(self) -> str:
-        """Its number of cells in words."""
+        """Number of cells in words."""
         return f"{len(self.cells)} cell" + "s" * (len(self.cells) != 1)
 
     @property
@@ -134,7 +135,7 @@ class BranchPart(Value):
         dict[str, bool],
         lambda self: dict(self.turns),
         As("turns"),
-        "whether the closure after a whole turn is that before it",
+        "true if the closure after a full turn is that before it",
     )
 
 
@@ -150,11 +151,34 @@ class MotorBeyond(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BranchProof(Result, shown_as="branch"):
-    """The branch of the zero configuration: q ↦ x from motors to passive coordinates, part by part.
+    """Proved branch of the zero configuration: q ↦ x from motors to passive coordinates, part by part.
 
-    ``system`` has the coordinates (name, axis, point, parent: the tree in order) and the loops' equations; lengths in
-    it are in ``system.length`` m, those of the parts in m. ``held`` are idle coordinates, which stay as they are. All
-    coordinates count from the file's zero."""
+    All coordinates count from the zero of the file.
+
+    Parameters
+    ----------
+    robot
+        Mechanism as read.
+    system
+        Coordinates (name, axis, point, parent: the tree in order) and loop equations, in units of ``system.length`` m.
+    motors, passive
+        Names of the motor coordinates and of the passive coordinates that follow from them.
+    fixed
+        Names of the coordinates of internal motions, which are constant.
+    parts
+        Parts of the loops with their cells (m, rad).
+    injective_box
+        Box of all motors (m, rad), low and high (n,) each, in which no two motor positions give the same pose (proved);
+        None without a proof.
+    regular
+        True if the proved box is proved to contain no Type 1 singularity.
+    box
+        Origin of the box: the limits of the file, the caller, a default.
+    tried
+        Number of cells that were tried.
+    limits
+        Limits of the joints without a motor.
+    """
 
     robot: Mechanism
     system: LoopSystem
@@ -163,12 +187,12 @@ class BranchProof(Result, shown_as="branch"):
     fixed: Recorded[tuple[str, ...]]
     parts: Recorded[tuple[BranchPart, ...]]
     injective_box: Annotated[tuple[Array, Array] | None, Table | None, f"{BACK}, or null"]
-    """A box of all motors (m, rad), low and high (n,) each, about the zero configuration, in which no two are proved to
-    give the platform one pose; None where there is no proof."""
-    regular: Annotated[bool, "whether the proved box has no Type 1 singularity (proved)"]
-    """Whether no motors in the proved box are proved to be at a Type 1 singularity."""
+    """Box of all motors (m, rad), low and high (n,) each, about the zero configuration, in which different motor values
+    are proved to give different poses; None without a proof."""
+    regular: Annotated[bool, "true if the proved box has no Type 1 singularity (proved)"]
+    """True if the proved box is proved to contain no Type 1 singularity."""
     box: Recorded[str]
-    """Where the box comes from: the file's limits, the caller, a default."""
+    """Origin of the box: the limits of the file, the caller, a default."""
     tried: Recorded[int]
     """Cells that were tried."""
     limits: Recorded[tuple[BranchLimit, ...]]
@@ -181,7 +205,7 @@ class BranchProof(Result, shown_as="branch"):
 
     @property
     def fixed_at(self) -> dict[str, float]:
-        """Where the idle coordinates are held (m, rad)."""
+        """Constant values of the coordinates of internal motions (m, rad)."""
         system = self.system
         every = dict(zip(system.names, (system.zero * system.units).tolist(), strict=True))
         return {name: every[name] for name in self.fixed}
@@ -195,12 +219,12 @@ class BranchProof(Result, shown_as="branch"):
         return found[0], found[1]
 
     def limits_in_words(self) -> list[str]:
-        """What is known about the limits of joints without a motor."""
+        """Results for the limits of joints without a motor."""
         says = {
-            KEPT: "kept in all proved cells (proved)",
-            PASSED: "passed in the proved cells",
-            OPEN: "not proved to be kept",
-            UNSEEN: "not looked at (balls, and joints at which loops are cut)",
+            KEPT: "satisfied in all proved cells (proved)",
+            PASSED: "exceeded in the proved cells",
+            OPEN: "not proved to be satisfied",
+            UNSEEN: "not examined (S joints, and joints at which loops are cut)",
         }
         told = {verdict: [each.words for each in self.limits if each.verdict == verdict] for verdict in says}
         return [f"{says[verdict]}: {', '.join(names)}" for verdict, names in told.items() if names]

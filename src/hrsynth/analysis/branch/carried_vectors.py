@@ -24,8 +24,8 @@ Places = NDArray[np.intp]
 
 @dataclass(frozen=True, eq=False)
 class ChainColumns:
-    """What a chain does to one vector: the places (k,) of its coordinates among all, ∂v (…, k, 3), and the axes
-    (…, k, 3) of its turns; the vector counts ``sign`` times."""
+    """Derivatives of one vector behind a chain: indices (k,) of its coordinates, ∂v (…, k, 3), and axes (…, k, 3) of
+    its rotations; the vector counts ``sign`` times."""
 
     places: Places
     columns: Any
@@ -68,7 +68,7 @@ class SweptChains:
         self._known: dict[tuple[Any, ...], CarriedVector] = {}
 
     def _chain(self, chain: tuple[int, ...]) -> tuple[Swept, Any, Any, Any]:
-        """What a chain does, and below each other (…, k, 3) the axes of turns, points of them, the axes of slides."""
+        """Screws of a chain: axes (…, k, 3) of the rotations, points on them, axes of the translations."""
         if chain not in self._swept:
             swept, none = self.system.displacement(chain, self.values), np.zeros(3)
             slides = [self.system.coordinates[i].slides for i in chain]

@@ -45,7 +45,7 @@ class BranchTube:
         return np.asarray(self.x + self.slopes @ (q - self.centre))
 
     def lies_in(self, other: BranchTube) -> bool:
-        """Whether all of it lies inside another tube, whose cell holds its own."""
+        """Return True if the tube lies inside another tube, whose cell contains its own."""
         off = np.abs(self.x - other.at(self.centre)) + np.abs(self.slopes - other.slopes) @ self.half + self.radius
         return bool(np.all(off < other.radius * (1 - AFFINE_ROUNDING)))
 
@@ -64,7 +64,7 @@ class TubeTrial:
     alive: NDArray[np.bool_]
 
     def kept(self, which: Any) -> TubeTrial:
-        """Some of the cells."""
+        """Return some of the cells."""
         return TubeTrial(
             self.part,
             *(
@@ -79,7 +79,7 @@ class TubeTrial:
         return len(self.part.driven), len(self.part.driven) + len(self.part.bent)
 
     def forms(self, radius: Array) -> list[AffineForms | None]:
-        """All coordinates over the tubes; None for those that are held."""
+        """Coordinates over the tubes; None for those that are constant."""
         n, count = self.symbols
         found: list[AffineForms | None] = [None] * len(self.part.system.coordinates)
         spread = np.zeros((*self.x.shape, count))
@@ -227,7 +227,7 @@ def drift(B: AffineForms) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class TubeDerivatives:
-    """Of k equations over tubes: the values (c, k), the derivatives by own unknowns (c, k, k), by the others of the
+    """For k equations over tubes: values (c, k), derivatives by the block's unknowns (c, k, k), by the others of the
     part (c, k, p), and along the tube by the noise symbols (c, k, n)."""
 
     values: AffineForms
@@ -239,7 +239,7 @@ class TubeDerivatives:
 def evaluate_equations(
     part: LoopPart, equations: Sequence[LoopEquation], forms: Sequence[AffineForms | None]
 ) -> tuple[list[Any], list[dict[int, Any]]]:
-    """The values of equations, and their derivatives by the coordinates that are not held."""
+    """Values of equations, and their derivatives by the coordinates that are not constant."""
     values: list[Any] = [0.0] * len(equations)
     slopes: list[dict[int, Any]] = [{} for _ in equations]
     groups: dict[int, list[int]] = {}
@@ -319,8 +319,8 @@ def turning(trial: TubeTrial, block: LoopBlock) -> tuple[LoopEquation, ...]:
 
 
 def _same_side(trial: TubeTrial, block: LoopBlock) -> NDArray[np.bool_]:
-    """Whether (c,) both ends of a rod's loop lie on one side of its centre over the tube: two points equally far from
-    it and equal across one direction are then the same."""
+    """Mask (c,) of tubes over which both ends of a rod's loop lie on one side of its centre: two points equally far
+    from it and equal across one direction then coincide."""
     assert block.loop is not None
     system = trial.part.system
     a, _, A = rod_ends(system, block.loop, trial.part.values(trial.centre, trial.x))

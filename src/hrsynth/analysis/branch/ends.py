@@ -1,4 +1,4 @@
-"""Where the proof of a branch ends: toggles, found in floating point; and whether a whole turn comes back to itself."""
+"""Ends of the proof of a branch: toggles (in floating point), and full turns that do or do not close."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from .growth import BranchEnd, Growth
 from .loop_parts import LoopPart
 
 HALVINGS = 40
-"""How often the way to a toggle is halved."""
+"""Number of bisections of the path to a toggle."""
 BEYOND = 20.0
-"""How far a toggle is looked for from where a cell was started, as a multiple of the way to its middle."""
+"""Search range of a toggle from the start of a cell, as a multiple of the distance to its middle."""
 TOLD = 4
 """Ends of the proof that are looked into, those of the largest cells first, for each set of joints."""
 
@@ -43,9 +43,9 @@ def _toggles(growth: Growth, ends: Sequence[BranchEnd]) -> Iterator[Toggle]:
         _, strengths, rows = np.linalg.svd(part.closure(q, x)[1])
         if last == 1.0 or strengths[-1] / max(home, 1e-300) > TOGGLE:
             why = (
-                "not tried: the effort was used up (a smaller --box needs less)"
+                "not tried: the cell limit was reached (use a smaller --box or more --max-cells)"
                 if not end.leaf.failed
-                else "undecided: the cells would have to be smaller"
+                else "undecided: smaller cells are needed"
             )
             yield Toggle(q * unit, (), (), why)
             continue
@@ -53,7 +53,9 @@ def _toggles(growth: Growth, ends: Sequence[BranchEnd]) -> Iterator[Toggle]:
         places = [i for i, moves in zip(part.unknowns, moving, strict=True) if moves]
         joints = tuple(dict.fromkeys(part.system.coordinates[i].joint for i in places))
         loops = tuple(loop.name for loop in part.loops if set(places).intersection(loop.coordinates))
-        yield Toggle(q * unit, joints, loops, "a determinant vanishes: these joints can move while all motors rest")
+        yield Toggle(
+            q * unit, joints, loops, "a determinant vanishes: these joints can move while all motors are fixed"
+        )
 
 
 def _follow_ways(part: LoopPart, q: Array, x: Array, goal: Array) -> tuple[Array, Array, Array]:
@@ -77,8 +79,8 @@ def _follow_ways(part: LoopPart, q: Array, x: Array, goal: Array) -> tuple[Array
 
 
 def turns(growth: Growth) -> tuple[tuple[str, bool], ...]:
-    """Of each motor that makes a whole turn and whose first and last face are proved throughout: whether the closures
-    there are the same, angles modulo 2π; not listed where neither is proved."""
+    """For each motor with a full turn whose first and last face are proved throughout: True if the closures there
+    agree, angles modulo 2π; not listed if neither is proved."""
     part, found = growth.part, []
     for k, i in enumerate(part.driven):
         whole = abs(growth.grid.high[k] - growth.grid.low[k] - 2 * np.pi) < AFFINE_ROUNDING
@@ -100,8 +102,8 @@ def turns(growth: Growth) -> tuple[tuple[str, bool], ...]:
 
 
 def _meets(growth: Growth, k: int, one: BranchTube, other: BranchTube, face: Array) -> bool | None:
-    """Whether the closure of one tube at a point of the last face lies in another tube, a whole turn before; None where
-    it is proved neither to lie in it nor out of it."""
+    """Return True if the closure of one tube at a point of the last face lies in another tube, a full turn before; None
+    if neither is proved."""
     part = growth.part
     x, good = part.close(face[None], one.at(face)[None])
     (point,) = prove_all(part, face[None], np.zeros((1, len(face))), x) if good[0] else (None,)
@@ -124,5 +126,5 @@ def _meets(growth: Growth, k: int, one: BranchTube, other: BranchTube, face: Arr
 
 
 def describe_ends(ends: Sequence[Toggle]) -> list[str]:
-    """The ends of a proof in words."""
+    """Describe the ends of a proof."""
     return [f"{each.reason}: {', '.join(each.joints)}" if each.joints else each.reason for each in ends]

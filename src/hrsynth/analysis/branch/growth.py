@@ -53,13 +53,13 @@ class GrownCell:
     failed: bool = False
     asked: bool = False
     beyond: bool = False
-    """Whether it is too large to be tried, and is not cut."""
+    """True if the cell is too large to be tried and is not cut."""
     number: int = -1
     neighbours: set[int] = field(default_factory=set)
 
     @property
     def volume(self) -> float:
-        """Its part of the box."""
+        """Fraction of the box."""
         return float(np.prod((self.high - self.low) / 2.0**FINEST_BRANCH_CELL))
 
 
@@ -229,7 +229,7 @@ class Growth:
         return found
 
     def _same(self, asked: Sequence[tuple[Array, Array, BranchTube, BranchTube | None]]) -> list[bool]:
-        """Whether at a point q the zero near x is enclosed, and its enclosure lies in the interior of one tube (or of
+        """Return True if at q the zero near x is enclosed, and its enclosure lies in the interior of one tube (or of
         both): it is then the only zero in them."""
         if not asked:
             return []
@@ -262,7 +262,7 @@ class Growth:
         return [self.grid.point((low + high) / 2)] if np.all(sides > 0) else []
 
     def whole_face(self, k: int, cells: Sequence[GrownCell]) -> bool:
-        """Whether cells at a face across side k fill it."""
+        """Return True if cells at a face across side k fill it."""
         return sum(_volume(np.delete(leaf.high - leaf.low, k)) for leaf in cells) == self.whole ** (len(self.q0) - 1)
 
     def _face(self, one: GrownCell, other: GrownCell) -> Array:
@@ -278,7 +278,8 @@ class Growth:
         return [self.leaves[k] for k in np.flatnonzero(touching)]
 
     def _around(self, leaf: GrownCell) -> list[tuple[GrownCell, Array, Array]]:
-        """The cells beside a proved one that were not asked for yet, each started at the middle of the common face."""
+        """Return the neighbours of a proved cell that were not tried yet, each started at the middle of the common
+        face."""
         found = []
         for other in self._beside(leaf):
             if other.tube is None and not other.asked:

@@ -55,7 +55,7 @@ class PosedCells:
         return self.poses.v[0] - wide, self.poses.v[0] + wide
 
     def regular(self, which: Places) -> bool:
-        """Whether |1 − Z F'| v < v with fixed Z, v > 0 over some cells together."""
+        """Return True if |1 − Z F'| v < v with fixed Z, v > 0 over some cells together."""
         part = AffineForms(self.rates.v[:, which], self.rates.r[which])
         low, high = (part.v[0] + sign * part.spread for sign in (-1, 1))
         if not (np.all(np.isfinite(low)) and np.all(np.isfinite(high))):
@@ -78,7 +78,7 @@ class InjectivityProof:
     known: dict[bytes, bool] = field(default_factory=dict)
 
     def one_to_one(self, low: Array, high: Array) -> bool:
-        """Whether no two motors in a box have one pose."""
+        """Return True if different motor values in a box are proved to have different poses."""
         own = self.cells.within(low, high)
         if not len(own):
             return False
@@ -88,7 +88,7 @@ class InjectivityProof:
         return halves is not None and all(self.one_to_one(*half) for half in halves) and self.apart(*halves)
 
     def apart(self, one: tuple[Array, Array], other: tuple[Array, Array]) -> bool:
-        """Whether no motors in one box have a pose of others in the other box."""
+        """Return True if no motor values in one box have a pose of others in the other box."""
         own = [self.cells.within(*box) for box in (one, other)]
         self.tried += 1
         if not all(map(len, own)):
@@ -170,13 +170,13 @@ def prove_injective_box(system: LoopSystem, grown: Sequence[Growth]) -> tuple[tu
 
 
 def _count(parts: Sequence[TubedCells]) -> int:
-    """How many cells of all motors together those of the parts make."""
+    """Return the number of cells of all motors that those of the parts make."""
     return int(np.prod([len(each.tubes) for each in parts]))
 
 
 def _part(trial: InjectivityProof, home: Array, low: Array, high: Array) -> tuple[Array, Array] | None:
-    """A large box about ``home`` in which no two motors have one pose, part of another: shrunk until it is proved, then
-    moved out side by side."""
+    """Return a large box about ``home``, part of another, in which different motor values have different poses: shrunk
+    until it is proved, then enlarged side by side."""
     whole = np.array([low, high])
     boxes = (home + size * (whole - home) for size in 0.7 ** np.arange(1, BACK_SIZES))
     box = next((each for each in boxes if trial.one_to_one(each[0], each[1])), None)
@@ -212,7 +212,7 @@ class TubedCells:
 
     @classmethod
     def of(cls, growth: Growth) -> TubedCells:
-        """Those that were grown."""
+        """Return the cells that were grown."""
         return cls(
             growth.part,
             np.array([growth.grid.point(leaf.low) for leaf in growth.proved]),
@@ -221,7 +221,7 @@ class TubedCells:
         )
 
     def within(self, low: Array, high: Array) -> TubedCells:
-        """Those that have room in common with a box."""
+        """Return the cells that intersect a box."""
         room = np.flatnonzero(np.all((self.low < high) & (self.high > low), axis=1))
         return TubedCells(self.part, self.low[room], self.high[room], [self.tubes[k] for k in room])
 
@@ -282,7 +282,7 @@ class SlopedPart:
 
     @classmethod
     def of(cls, part: LoopPart, tubes: Sequence[BranchTube]) -> SlopedPart:
-        """Those of tubes; infinite bounds where none is found."""
+        """Return those of tubes; infinite bounds where none is found."""
         trial = trial_of(part, tubes)
         equations = [
             each for block in part.blocks for each in (block.equations if block.loop is None else turning(trial, block))

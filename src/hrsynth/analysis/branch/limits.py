@@ -1,7 +1,7 @@
-"""Whether joints without a motor keep their limits over a proved branch.
+"""Limits of joints without a motor over a proved branch.
 
-Over a cell |q − q_c| ≤ h the closure lies in the tube |x − x_c − S (q − q_c)| ≤ r, so that each coordinate is at most
-x_c + |S| h + r, and at the corner where x_c + |S| h is met at least x_c + |S| h − r; likewise below.
+Over a cell |q − q_c| ≤ h the closure lies in the tube |x − x_c − S (q − q_c)| ≤ r. Each coordinate is at most
+x_c + |S| h + r, and at the corner where x_c + |S| h is attained at least x_c + |S| h − r; likewise below.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from .answer import KEPT, OPEN, PASSED, UNSEEN, BranchLimit, BranchPart
 def branch_limits(
     robot: Mechanism, motors: Sequence[str], parts: Sequence[BranchPart], held: Sequence[str]
 ) -> Iterator[BranchLimit]:
-    """The limits of all joints without a motor, in the order of the file, with what the proved cells say of them."""
+    """Return the limits of all joints without a motor, in the order of the file, with their verdicts over the proved
+    cells."""
     for name in robot.joints:
         if name in robot.tilt_limits:
             yield BranchLimit(name, None, None, None, None, UNSEEN)

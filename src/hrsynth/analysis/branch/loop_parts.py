@@ -24,8 +24,8 @@ NEWTON_STEPS = 30
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LoopEquation(Value):
-    """An equation of a part: a row of a loop, or a gear (``row`` is None); ``swings``: one of the equations that turn
-    a joint which was left out to the place where the loop closes."""
+    """Equation of a part: a row of a loop, or a coupling (``row`` is None); ``swings``: one of the equations that
+    rotate a joint which was left out to where the loop closes."""
 
     of: JointLoop | CouplingEquation
     row: LoopRow | None = None
@@ -68,7 +68,7 @@ class LoopPart(Value):
 
     @cached_property
     def place(self) -> dict[int, int]:
-        """Where an unknown stands in this part."""
+        """Return the index of an unknown in this part."""
         return {i: k for k, i in enumerate(self.unknowns)}
 
     @cached_property
@@ -80,7 +80,7 @@ class LoopPart(Value):
         )
 
     def values(self, q: Array, x: Array) -> list[Array | None]:
-        """All coordinates, held ones None, for those that drive this part (…, n) and its unknowns (…, p)."""
+        """Coordinates, constant ones None, for those that drive this part (…, n) and its unknowns (…, p)."""
         found: list[Array | None] = [None] * len(self.system.coordinates)
         for places, given in ((self.driven, q), (self.unknowns, x)):
             for k, i in enumerate(places):
@@ -138,7 +138,7 @@ def whole(
     values: Any,
     shape: tuple[int, ...] = (),
 ) -> tuple[Array, Array]:
-    """All equations of loops and gears (…, m) and their derivatives by all coordinates (…, m, N), at values of a
+    """Equations of loops and couplings (…, m) and their derivatives by all coordinates (…, m, N), at values of a
     ``shape``, None for those at zero."""
     count = sum(len(loop.rows) for loop in loops) + len(gears)
     errors, rates = np.zeros((*shape, count)), np.zeros((*shape, count, len(values)))
@@ -159,12 +159,9 @@ def whole(
 
 
 def parts_of(system: LoopSystem) -> tuple[tuple[LoopPart, ...], tuple[int, ...]]:
-    """The parts of a system, and the coordinates that are held: those that turn nothing but themselves
-    (idle), and those of loops that no motor has to do with.
-
-    Raises ``MotorsNotEnough`` where the platform can move while all that is driven rests, ``BadRequest`` where what is
-    driven depends on each other.
-    """
+    """Return the parts of a system, and the coordinates that are constant: those that rotate only themselves
+    (internal), and those of loops without a motor. Raises ``MotorsNotEnough`` if the platform can move while all motors
+    are fixed, ``BadRequest`` if motors depend on each other."""
     held = _idle(system)
     unknowns = [i for i, each in enumerate(system.coordinates) if not each.driven and i not in held]
     parts = [_part(system, group) for group in _groups(system, unknowns)]
@@ -173,11 +170,8 @@ def parts_of(system: LoopSystem) -> tuple[tuple[LoopPart, ...], tuple[int, ...]]
 
 
 def _idle(system: LoopSystem) -> set[int]:
-    """Coordinates to hold, one for each motion at zero that leaves the platform and what is driven at rest: of each
-    the one that takes the largest part in it.
-
-    Raises ``BadRequest`` where what is driven is not independent at zero.
-    """
+    """Choose coordinates to fix, one for each motion at zero that leaves the platform and the motors fixed: of each the
+    one with the largest share. Raises ``BadRequest`` if the motors are not independent at zero."""
     held: set[int] = set()
     _, rates = whole(system, system.loops, system.gears, system.zero)
     looped = {i for loop in system.loops for i in loop.coordinates}
@@ -199,9 +193,8 @@ def _idle(system: LoopSystem) -> set[int]:
     dependent = spectrum(rates[:, every]).rank.value - spectrum(rates[:, free]).rank.value
     if dependent:
         raise BadRequest(
-            f"{system.mechanism.name}: coordinates of motors that depend on each other at the zero configuration",
-            count,
-            f"{count - dependent}: name fewer of them with --motors",
+            f"{system.mechanism.name}: only {count - dependent} of {count} motor coordinates are independent at zero",
+            remedy=f"Choose {count - dependent} with --motors.",
         )
     while free:
         kernel = spectrum(rates[:, free]).kernel
@@ -219,7 +212,7 @@ def _idle(system: LoopSystem) -> set[int]:
 
 
 def _platform_moves(system: LoopSystem, free: Sequence[int], rates: Array) -> bool:
-    """Whether the platform moves at zero with rates of some coordinates."""
+    """Return True if the platform moves at zero with rates of some coordinates."""
     by = dict(zip(free, rates, strict=True))
     spin, velocity = np.zeros(3), np.zeros(3)
     for i in system.way(system.body[system.mechanism.platform]):
@@ -235,7 +228,7 @@ def _platform_moves(system: LoopSystem, free: Sequence[int], rates: Array) -> bo
 def _groups(
     system: LoopSystem, unknowns: Sequence[int]
 ) -> list[tuple[list[int], list[JointLoop], list[CouplingEquation]]]:
-    """Unknowns that equations connect, with those loops and gears."""
+    """Unknowns that equations connect, with those loops and couplings."""
     home = {i: {i} for i in unknowns}
     every: list[JointLoop | CouplingEquation] = [*system.loops, *system.gears]
     for each in every:
@@ -286,8 +279,8 @@ def _part(system: LoopSystem, group: tuple[list[int], list[JointLoop], list[Coup
 
 
 def _as_cut(loop: JointLoop, unknowns: Sequence[int]) -> JointLoop:
-    """A loop with all its equations where the joint that was left out cannot turn its rod everywhere: a held coordinate
-    of it is no spin."""
+    """Return a loop with all its equations if the joint that was left out cannot rotate its rod everywhere: a constant
+    coordinate of it is no spin."""
     if loop.swung is None:
         return loop
     turning = sum(i in unknowns for i in loop.chains[1][loop.swung : loop.swung + loop.swings])

@@ -27,14 +27,14 @@ from ...results import Value
 from ...tolerances import ROUNDED_AXIS, SAME_POINT
 
 _PREFERRED = {"F": 0, "6": 1, "P": 2, "R": 3, "C": 4, "U": 5, "E": 6, "S": 7}
-"""Which joints the spanning tree takes first."""
+"""Priority of joint types in the spanning tree."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TreeCoordinate(Value):
-    """One coordinate of a joint: a turn (rad) about, or a slide (characteristic lengths) along an ``axis`` (3,) through
-    ``point`` (3,), both as they lie at zero; ``parent`` is the coordinate before it, −1 at the base; ``zero`` is what
-    it counts there."""
+    """Coordinate of a joint: a rotation (rad) about, or a translation (characteristic lengths) along an ``axis`` (3,)
+    through ``point`` (3,), both as they lie at zero; ``parent`` is the coordinate before it, −1 at the base; ``zero``
+    is its value there."""
 
     name: str
     joint: str
@@ -81,7 +81,7 @@ class JointLoop(Value):
     swung: int | None = None
     swings: int = 0
     planar: bool = False
-    """Whether all its links move in a plane, so that three equations at most are not met of themselves."""
+    """True if all its links move in a plane, so that at most three equations are independent."""
 
     @property
     def coordinates(self) -> tuple[int, ...]:
@@ -102,8 +102,8 @@ class CouplingEquation(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LoopSystem(Value):
-    """The coordinates of a mechanism's spanning tree, parents first, the loops between them and the gears;
-    ``body[link]`` is the coordinate that carries a link, −1 for what stands still; ``length`` the unit (m)."""
+    """Coordinates of a mechanism's spanning tree, parents first, the loops between them and the couplings;
+    ``body[link]`` is the coordinate that carries a link, −1 for fixed links; ``length`` the unit (m)."""
 
     mechanism: Mechanism
     length: float
@@ -134,8 +134,8 @@ class LoopSystem(Value):
 
     @property
     def as_filed(self) -> LoopSystem:
-        """The same with coordinates that count from the file's zero; those of balls, planes and free bodies from the
-        zero configuration."""
+        """Return the system with coordinates from the zero of the file; those of spherical, planar and free joints from
+        the zero configuration."""
         joints, length, found = self.mechanism.joints, self.length, list(self.coordinates)
         for name in {each.joint for each in found if each.joint in joints}:
             offset, own = joints[name].offset, [i for i, each in enumerate(found) if each.joint == name]
@@ -146,7 +146,7 @@ class LoopSystem(Value):
 
     @property
     def metric(self) -> LoopSystem:
-        """The same in metres; what is zero but for rounding is zero."""
+        """Return the system in metres; values that are zero up to rounding are zero."""
 
         def point(p: Array) -> Array:
             return frozen(_drop_rounding(p * self.length))
@@ -186,7 +186,7 @@ class LoopSystem(Value):
         return tuple(reversed(found))
 
     def displacement(self, chain: Sequence[int], values: Any) -> Swept:
-        """What a chain of coordinates does: see :class:`Swept`; ``values`` are those of all, None for those at zero."""
+        """Evaluate a chain of coordinates: see :class:`Swept`; ``values`` are those of all, None for those at zero."""
         return Swept.of([self.coordinates[i] for i in chain], [values[i] for i in chain])
 
     def read(self, pose: Callable[[str], Array]) -> Array:
@@ -256,7 +256,7 @@ class Swept:
         return cls(R, o, c, axes, points)
 
     def at(self, p: Array) -> Any:
-        """Where a point (3,) of the end, as it lies at zero, is."""
+        """Return the position of a point (3,) of the end, given as it lies at zero."""
         return self.o + rotate(self.R, p - self.c)
 
     def rate(self, k: int, p: Any) -> Any:
@@ -337,7 +337,7 @@ def residuals(
 
 
 def rod_ends(system: LoopSystem, loop: JointLoop, values: Any) -> tuple[Any, Any, Any]:
-    """Of a loop with a joint that is left out: where its ends a and b are, and the centre A of that joint (…, 3)."""
+    """Return the ends a and b of a loop with a joint that is left out, and the centre A of that joint (…, 3)."""
     assert loop.swung is not None
     one, two = (system.displacement(chain, values) for chain in loop.chains)
     before = system.displacement(loop.chains[1][: loop.swung], values)
@@ -396,7 +396,7 @@ def loop_system(mechanism: Mechanism, driven: Sequence[str], free: bool = False)
     kept = {joint.name for joint in tree}
     missing = [name for name in driven if name not in kept]
     if missing:
-        raise BadMechanism(f"{mechanism.name}: driven joints that close a loop among themselves", ", ".join(missing))
+        raise BadMechanism(f"{mechanism.name}: motors form a kinematic loop by themselves", ", ".join(missing))
     system = LoopSystem(mechanism, length, tuple(coordinates), body, (), _gears(mechanism, coordinates, length))
     loops = [
         _loop(system, joint, normal) for joint in joints if joint.name not in kept and joint.type is not JointType.FREE
@@ -431,7 +431,8 @@ def _free(mechanism: Mechanism, normal: Array | None) -> Joint:
 
 
 def _weight(joint: Joint, mechanism: Mechanism, driven: Sequence[str], geared: set[str]) -> float:
-    """What comes first into the tree: motors and gears, then joints with few freedoms; joints of the platform last."""
+    """Sort key of the spanning tree: motors and couplings first, then joints with few dof; joints of the platform
+    last."""
     if joint.name in driven or (joint.successor in geared and joint.type.freedoms == 1):
         return -1.0
     return _PREFERRED[joint.type.value] + (0.5 if mechanism.platform in joint.links else 0.0)
@@ -505,7 +506,7 @@ def _shorten_loop(system: LoopSystem, loops: Sequence[JointLoop], loop: JointLoo
 
 
 def equations(joint: Joint) -> list[LoopRow]:
-    """The equations of a joint that is cut, (6 − its freedoms): positions first."""
+    """Return the equations of a joint that is cut, (6 − its dof): positions first."""
     E = np.eye(3)
     if joint.type is JointType.SPHERICAL:
         return [LoopRow("point", e) for e in E]

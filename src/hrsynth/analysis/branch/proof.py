@@ -27,7 +27,7 @@ from .loop_parts import LoopPart, parts_of, whole
 from .loops import LoopSystem, loop_system
 from .redundant import closed_to, unexplained_equations
 
-GROUPS = "the loops' links move in groups of fewer dimensions"
+GROUPS = "motion of the links in a subgroup of lower dimension"
 BOUNDED = "bounded over the tubes"
 BoxLike = Mapping[str, Sequence[float]] | str
 
@@ -36,11 +36,11 @@ MotorBox = Annotated[
     BoxLike | None,
     option(
         "Intervals of motors (m, rad), such as hip=-1:1,slide=0:0.2 (default: the file's limits, else a "
-        "whole turn, or a characteristic length either way).",
+        "full turn, or plus and minus a characteristic length).",
         "INTERVALS",
     ),
 ]
-Cells = Annotated[int, option("Most cells to try for each part of the loops.", "COUNT", low=1)]
+Cells = Annotated[int, option("Largest number of cells to try for each part of the loops.", "COUNT", low=1)]
 
 
 @analysis(
@@ -49,24 +49,43 @@ Cells = Annotated[int, option("Most cells to try for each part of the loops.", "
     seeded=False,
 )
 def branch(robot: RobotLike, box: MotorBox = None, *, max_cells: Cells = BRANCH_CELLS) -> BranchProof:
-    """Where the joints are proved to be one function of the motors, on the branch of the zero configuration, and where
-    that ends.
+    """Prove that the passive joints are a function of the motors on the branch of the zero configuration.
 
-    Where the passive coordinates are proved to be one continuous function of the motors, on the branch of the zero
-    configuration (docs/pages/prove_a_branch.md).
+    Parameters
+    ----------
+    robot
+        Mechanism, observed robot, path of a file, or name of a shipped robot.
+    box
+        Interval of each motor (m, rad), a mapping or text ``hip=-1:1,slide=0:0.2``. Default: the limits of the file;
+        without them a full turn, or plus and minus a characteristic length.
+    max_cells
+        Largest number of cells to try for each part of the loops.
 
-    ``box`` gives the motors' intervals (m, rad), as a mapping or as text ``hip=-1:1,slide=0:0.2``; the default is the
-    file's limits or, without them, a whole turn, or a characteristic length either way. ``max_cells`` is the largest
-    number of cells to try for each part of the loops.
+    Returns
+    -------
+    BranchProof
+        Proved cells, each with exactly one closure per motor value; the ends of the proof; the inverse map.
 
-    Raises ``MotorsNotEnough`` if the motors do not determine the platform at the zero configuration, ``BadRequest`` for
-    unknown motors or motors that depend on each other, ``LoopsNotClosed``.
+    Raises
+    ------
+    MotorsNotEnough
+        If the motors do not determine the platform at the zero configuration.
+    BadRequest
+        For unknown motors, or motors that depend on each other.
+    LoopsNotClosed
+        If the file does not close its loops.
 
+    Notes
+    -----
+    Interval arithmetic over cells of motor values (Krawczyk's test), docs/pages/prove_a_branch.md.
+
+    Examples
+    --------
     >>> hrsynth.branch("rrrrr_m1", {"shoulder_1": (-0.05, 0.05), "shoulder_2": (-0.05, 0.05)})
     <BranchProof: rrrrr_m1, 2 motors, 2 passive coordinates: shoulder_1, shoulder_2: 100 % of the box proved, 1 cell>
     """
     if max_cells < 1:
-        raise BadRequest("max_cells", max_cells, "1 cell or more")
+        raise BadRequest("--max-cells", max_cells, "1 or more")
     given = as_robot(robot)
     mechanism = given if isinstance(given, Mechanism) else given.robot
     mechanism.require_platform()
@@ -141,8 +160,8 @@ def _reach(part: LoopPart, intervals: Mapping[int, tuple[float, float]]) -> floa
 
 
 def _first(grid: CellGrid, zero: Array, coarsest: float, max_cells: int) -> list[GrownCell]:
-    """The cells to begin with: the box, or, where the effort is spent before cells that are not too coarse fill it, as
-    many as it allows of those that are proved about zero."""
+    """Return the first cells: the box, or, if the cell limit is reached before fine enough cells fill it, as many as
+    the limit allows of those that are proved about zero."""
     n = len(grid.low)
     if not coarsest or coarsest**n * max_cells >= 1:
         return whole_box(n)
@@ -171,24 +190,24 @@ def _box(system: LoopSystem, box: BoxLike | None) -> tuple[dict[int, tuple[float
         low, high = (-np.inf, np.inf) if wanted is not None else limits.get(each.joint, (-np.inf, np.inf))
         if wanted is not None:
             low, high = wanted
-            sources.add("as asked")
+            sources.add("as requested")
         elif high - low <= WIDEST_BRANCH_BOX * unit:
             sources.add("limits of the file")
         else:
             reach = system.length if each.slides else np.pi
             low, high = max(low, each.zero * unit - reach), min(high, each.zero * unit + reach)
-            sources.add("a characteristic length either way" if each.slides else "a whole turn")
+            sources.add("plus and minus a characteristic length" if each.slides else "a full turn")
         zero = round(each.zero * unit, 12)
         if not low <= zero <= high or not 0 < high - low <= WIDEST_BRANCH_BOX * unit:
             raise BadRequest(
-                f"interval of motor {each.name!r}",
+                f"--box {each.name}={low:g}:{high:g}: interval of the motor",
                 f"{low:g}:{high:g}",
-                f"low < high, with the zero configuration in it (there it is {zero:.6g}), at most "
+                f"low < high, with {zero:.6g} (zero configuration) in it, at most "
                 f"{WIDEST_BRANCH_BOX * unit:.4g} {'m' if each.slides else 'rad'} wide",
             )
         found[i] = low / unit, high / unit
     if given:
-        raise BadRequest("motors of the box", ", ".join(sorted(given)), [system.names[i] for i in system.driven])
+        raise BadRequest("--box: motors", ", ".join(sorted(given)), [system.names[i] for i in system.driven])
     return found, ", ".join(sorted(sources))
 
 
@@ -199,30 +218,28 @@ def _zero(mechanism: Mechanism, name: str) -> float:
 
 
 def parsed_box(box: BoxLike | None) -> dict[str, tuple[float, float]]:
-    """The intervals that are asked for, by motor."""
+    """Return the requested intervals by motor."""
     if box is None:
         return {}
     if not isinstance(box, Mapping | str):
-        raise BadRequest(
-            "a box of motors", box, "a dict such as {'hip': (-1, 1)}, or a text such as hip=-1:1,slide=0:0.2"
-        )
+        raise BadRequest("--box", box, "a dict such as {'hip': (-1, 1)}, or a text such as hip=-1:1,slide=0:0.2")
     pairs = box.items() if isinstance(box, Mapping) else [each.rpartition("=")[::2] for each in box.split(",")]
     found: dict[str, tuple[float, float]] = {}
     for name, interval in pairs:
         if str(name).strip() in found:
-            raise BadRequest("motors of the box", f"{str(name).strip()} twice", "each motor once")
+            raise BadRequest(f"--box: motor {str(name).strip()} is given twice", remedy="Omit one.")
         try:
             low, high = (float(v) for v in (interval.split(":") if isinstance(interval, str) else interval))
         except (TypeError, ValueError):
             raise BadRequest(
-                f"interval of motor {name!r}" if name else "a box of motors", interval, "low:high, such as hip=-1:1"
+                f"--box: interval of motor {name!r}" if name else "--box", interval, "low:high, such as hip=-1:1"
             ) from None
         found[str(name).strip()] = (low, high)
     return found
 
 
 def _answer(part: LoopPart, growth: Growth) -> BranchPart:
-    """What was grown, in metres and radians."""
+    """Return the grown cells in metres and radians."""
     system = part.system
     unit_q, unit_x = system.units[list(part.driven)], system.units[list(part.unknowns)]
     cells = []

@@ -1,4 +1,4 @@
-"""Why equations of loops that were left out hold: by the group that a loop's links move in, or to what bound."""
+"""Redundant loop equations: proof that they hold, by the group in which a loop's links move, or a bound."""
 
 from __future__ import annotations
 
@@ -15,11 +15,9 @@ from .loops import JointLoop, LoopSystem, parts
 
 
 def unexplained_equations(part: LoopPart) -> tuple[LoopEquation, ...]:
-    """The equations that were left out and do not follow from the others.
-
-    All displacements about a loop lie in the group that its joints generate, of dimension d; with the f freedoms of the
-    joint that is cut d − f independent equations close it, so that the others hold as long as these are independent.
-    """
+    """Redundant loop equations that do not follow from the others. All displacements about a loop lie in the group of
+    dimension d that its joints generate. With f dof of the cut joint, d − f independent equations close it; the others
+    hold as long as these are independent."""
     found = []
     chosen = [each.of.name for block in part.blocks for each in block.equations]
     needed = {loop.name: dependent_rows(part.system, loop) for loop in part.loops if loop.swung is None}
@@ -31,7 +29,7 @@ def unexplained_equations(part: LoopPart) -> tuple[LoopEquation, ...]:
 
 
 def dependent_rows(system: LoopSystem, loop: JointLoop) -> int:
-    """How many independent equations close a loop: on which all others depend."""
+    """Return the number of independent equations of a loop."""
     return group_dimension(system, loop) - JointType(system.mechanism.joints[loop.name].type).freedoms
 
 

@@ -1,1 +1,1 @@
-"""Where a controller loses a freedom: the Type 2 condition in words, as an expression, and as a locus."""
+"""Type 2 singularities: the condition in words, as an expression, and as a locus."""

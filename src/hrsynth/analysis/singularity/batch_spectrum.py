@@ -18,19 +18,19 @@ from ..singularity_indices import interaction_matrix
 
 Spectrum = Callable[[Sequence[ClosedConfiguration], ObservationModel], tuple[Array, Array]]
 SPOTS = 10
-"""Configurations of each sweep at which the batch is held against Pinocchio."""
+"""Number of configurations of each sweep at which the batch is compared with Pinocchio."""
 
 
 @dataclass(frozen=True, eq=False)
 class Quick:
-    """A batch that answers a question about directions, one a leg."""
+    """Batch for an observation model of directions, one per leg."""
 
     placer: ConfigurationBuilder
     observation_model: ObservationModel
 
     @classmethod
     def of(cls, placer: ConfigurationBuilder | None, observation_model: ObservationModel) -> Quick | None:
-        """None where there is no batch, or it is not asked for its own directions."""
+        """Return the batch, None without one or if other directions are requested."""
         if placer is None or not all(
             isinstance(o, Direction) and o is placer.seen.get(o.leg) for o in observation_model.observations
         ):

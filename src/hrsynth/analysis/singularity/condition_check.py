@@ -35,16 +35,15 @@ CHUNK = 250
 ON_LOCUS = 10
 """Poses on the locus that are constructed, where there are so many."""
 TRIES = 4
-"""Weakest poses from which a pose is sought on a locus across which the expression has no sign, or none was met."""
+"""Number of poses nearest a singularity from which the locus is searched, if the expression has no sign across it, or
+none was found."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Agreement(Value):
-    """How many poses were tried, and how far words, expression and rank are apart.
-
-    ``largest_angle`` is the largest angle between what each watched leg lets the platform do by its named vectors and
-    by Pinocchio's relation; ``disagreements`` counts poses at which one sees a singularity and another none.
-    """
+    """Result of the check of the condition: number of poses, and differences between words, expression and rank.
+    ``largest_angle`` is the largest angle between the platform motions that each locked leg allows by its named vectors
+    and by Pinocchio's relation; ``disagreements`` counts poses at which only one of them finds a singularity."""
 
     points: Recorded[int]
     disagreements: Recorded[int]
@@ -72,12 +71,10 @@ def agreement(
     seed: int = 0,
     placer: ConfigurationBuilder | None = None,
 ) -> Agreement:
-    """Compare at ``count`` random reachable poses, at poses on the locus, and where descents of the rank itself from
-    the weakest poses end.
+    """Compare at ``count`` random reachable poses, at poses on the locus, and at the ends of descents of the rank.
 
-    Raises ``Disagreement`` where the rank, the rows behind the words and the expression do not agree. Poses near
-    constraint singularities of the loops, where no rank is certain, and those at which a leg keeps the platform from
-    moving at all in one of its freedoms are left out.
+    Raises ``Disagreement`` if the rank, the rows behind the words and the expression do not agree. Poses near
+    constraint singularities, where no rank is certain, and those at which a leg blocks a platform dof are left out.
     """
     wrong = positive = negative = met = 0
     angle, smallest = 0.0, np.inf
@@ -147,7 +144,7 @@ def agreement(
                 break
         if on_locus:
             break
-    report("weakest poses")
+    report("poses nearest a singularity")
     for _, weak in [*low, *others][:RANK_DESCENTS]:
         at = lose(weak, observation_model)
         if at is not None and not _beside(at, observation_model, loops, freedoms):
@@ -170,7 +167,7 @@ def spectrum(configurations: Sequence[ClosedConfiguration], observation_model: O
 
 
 def _measurable(chunk: list[ClosedConfiguration], observation_model: ObservationModel) -> list[ClosedConfiguration]:
-    """Those at which everything has a value: no camera is within a cylinder."""
+    """Return those at which everything has a value: no camera is within a cylinder."""
     if not any(isinstance(o, CameraObservation) and o.radius is not None for o in observation_model.observations):
         return chunk
     return [at for at in chunk if _has_values(at, observation_model)]
@@ -185,7 +182,7 @@ def _has_values(at: ClosedConfiguration, observation_model: ObservationModel) ->
 
 
 def _beside(at: ClosedConfiguration, observation_model: ObservationModel, loops: float, freedoms: int) -> bool:
-    """Whether no rank is certain at a configuration, or the platform itself has fewer freedoms there."""
+    """Return True if no rank is certain at a configuration, or the platform itself has fewer dof there."""
     return (
         not _has_values(at, observation_model)
         or at.kernel()[1].weakest < loops
@@ -196,7 +193,7 @@ def _beside(at: ClosedConfiguration, observation_model: ObservationModel, loops:
 def _is_missed(
     at: ClosedConfiguration, observation_model: ObservationModel, pattern: ConstraintPattern, condition: Condition
 ) -> bool:
-    """Whether the rows behind the words clearly keep their rank where the relation loses its own."""
+    """Return True if the rows behind the words clearly keep their rank where the relation loses its own."""
     try:
         rows = condition.rows(pattern.values_at([at]))
     except UndefinedValue:
@@ -210,8 +207,8 @@ def smallest_of(rows: Array) -> Array:
 
 
 def _out_of_proportion(sizes: Array) -> int:
-    """At how many poses an expression with a sign is not the same multiple of the rows' volume as elsewhere; a law of
-    tips that keep their place in the platform."""
+    """Return the number of poses at which a signed expression is not the same multiple of the rows' volume as
+    elsewhere; for tips that are fixed in the platform."""
     if len(sizes) == 0:
         return 0
     values, volumes = sizes.T
@@ -231,7 +228,7 @@ def _chunks(configurations: Iterator[ClosedConfiguration]) -> Iterator[list[Clos
 
 
 def _differ(*measures: Array) -> Array:
-    """Where one measure is zero and another is clearly not."""
+    """Mask of the poses at which one measure is zero and another is clearly not."""
     table = np.array(measures)
     return (table.min(axis=0) < RANK_CUTOFF) & (table.max(axis=0) > RANK_CUTOFF * RANK_GAP)
 
@@ -252,8 +249,8 @@ def _relations(
 
 
 def _weakest(here: PatternValues, observation_model: ObservationModel, condition: Condition) -> tuple[Array, float]:
-    """Smallest singular values by Pinocchio, and the largest angle by which a watched leg's named vectors miss what
-    Pinocchio says it lets the platform do."""
+    """Smallest singular values by Pinocchio, and the largest angle between the motions that a locked leg allows by its
+    named vectors and by Pinocchio."""
     named = isinstance(condition, Named)
     sigma, parts = _relations(here.configurations, observation_model, here.pattern.bodies if named else ())
     labels = np.repeat([o.leg for o in observation_model.observations], observation_model.sizes)
@@ -319,7 +316,8 @@ def _descents(
     pattern: ConstraintPattern,
     condition: Condition,
 ) -> Iterator[ClosedConfiguration | None]:
-    """Zeros of the rows sought from weak poses: rows(q) x = 0 with |x| = 1; None where one is not found."""
+    """Zeros of the rows searched from poses near a singularity: rows(q) x = 0 with |x| = 1; None where one is not
+    found."""
     for _, start in low:
         yield descend(start, observation_model, pattern, condition)
 
@@ -331,7 +329,7 @@ def _size(pair: tuple[float, ClosedConfiguration]) -> float:
 def _is_known(
     at: ClosedConfiguration, others: Sequence[ClosedConfiguration], observation_model: ObservationModel
 ) -> bool:
-    """Whether a configuration's platform pose is one of others'."""
+    """Return True if a configuration's platform pose is one of others'."""
     X = at.pose(observation_model.platform)
     return any(np.linalg.norm(X - other.pose(observation_model.platform)) <= SAME_SPOT for other in others)
 
@@ -339,8 +337,8 @@ def _is_known(
 def descend(
     start: ClosedConfiguration, observation_model: ObservationModel, pattern: ConstraintPattern, condition: Condition
 ) -> ClosedConfiguration | None:
-    """A pose on the locus near ``start``: least squares in the platform's motions and the lost one; None where there is
-    none near."""
+    """Return a pose on the locus near ``start``: least squares in the platform's motions and the unobserved one; None
+    if there is none near."""
     from scipy.optimize import least_squares
 
     here = start

@@ -40,10 +40,10 @@ STEPS = 51
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SingularityMap(Value):
-    """A robot over a plane: the expression's value, the smallest singular value (Type 2 where zero) and the inverse of
-    the largest (Type 1 where zero), each (nx, ny), NaN where no pose is reached; where the expression has no sign,
-    ``spots`` are singular poses (k, 2) that were found, and ``curve`` pieces (k, 2, 2) of the curve that was; ``never``
-    where the condition cannot vanish, ``everywhere`` where it applies to all poses."""
+    """Singularity map of a robot over a plane. It has the expression's value, the smallest singular value (Type 2 where
+    zero) and the inverse of the largest (Type 1 where zero), each (nx, ny), NaN where no pose is reached; if the
+    expression has no sign, ``spots`` are singular poses (k, 2) that were found, and ``curve`` pieces (k, 2, 2) of the
+    curve; ``never`` if the condition cannot vanish, ``everywhere`` if it applies to all poses."""
 
     value: Annotated[Array, list[list[Number]], As("expression"), "null: not reached"]
     signed: bool
@@ -66,7 +66,7 @@ class Locus(Value):
     @property
     @recorded()
     def reached(self) -> int:
-        """How many of its poses the robot reaches."""
+        """Number of its poses that the robot reaches."""
         return int(np.sum(np.isfinite(self.hidden.type2)))
 
     axes = Shown(dict[str, list[float]], lambda self: dict(self.grid.axes))
@@ -83,10 +83,10 @@ def locus(
     steps: int = STEPS,
     seed: int = 0,
 ) -> Locus:
-    """Where the hidden and the real robot (with its own motors) lose a freedom over a plane of poses.
+    """Singularity loci of the hidden and the real robot (with its motors) over a plane of poses.
 
-    ``plane`` fixes parts of the pose so that two are left; a robot that is only partially controllable has no locus
-    (``BadRequest``). Raises ``NoReachablePose`` where no pose of the plane is reached.
+    ``plane`` fixes parts of the pose so that two are free; a robot that is only partially controllable has no locus
+    (``BadRequest``). Raises ``NoReachablePose`` if no pose of the plane is reached.
     """
     setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed)
     hidden = _controllable(setup)
@@ -110,9 +110,8 @@ def _controllable(setup: ObservedRobot) -> MeasuredRobot:
     hidden = MeasuredRobot.of_directions(setup)
     if hidden.verdict.rank < setup.dof:
         raise BadRequest(
-            f"{setup.robot.name} has no locus: a freedom is lost at every pose",
-            None,
-            "legs that make it controllable",
+            f"{setup.robot.name} has no singularity locus: a platform dof is unobserved at every pose",
+            remedy="Observe legs that make it controllable (hrsynth legs).",
         )
     return hidden
 
@@ -173,10 +172,8 @@ def frame_plane(
     steps: int,
     met: Callable[[ClosedConfiguration, Grid], NDArray[np.bool_]],
 ) -> Grid:
-    """The grid that just holds what is reached of a plane; ``met`` says which cells of a coarse one are, (n,).
-
-    Raises ``NoReachablePose`` where the plane's own parts are out of reach, ``BadRequest`` where not two parts are
-    free."""
+    """Return the grid around the reached part of a plane; ``met`` is the mask of reached cells of a coarse one, (n,).
+    Raises ``NoReachablePose`` if the plane is out of reach, ``BadRequest`` unless two parts are free."""
     plane, names, first = _begin_plane(start, observation_model, motion, plane)
     centre = _coordinates(motion, first, names)
     centre = [0.0 if name == "phi" else c for name, c in zip(names, centre, strict=True)]
@@ -228,8 +225,8 @@ def _begin_plane(
 
 
 def _last(coarse: Grid, found: Array, axis: int, end: int, met: Callable[[Grid], NDArray[np.bool_]]) -> float:
-    """How far a plane is reached along one axis, to half a step of the coarse grid and as far as that goes: what is
-    ``found`` (2, 2) by it, and thinner tips beyond, of which cells are looked at that are ``CLOSER``."""
+    """Return the reached extent of a plane along one axis, to half a step of the coarse grid: ``found`` (2, 2) by it,
+    and thinner tips beyond, of which cells are ``CLOSER``."""
     (_, along), (_, across) = coarse.axes[axis], coarse.axes[1 - axis]
     step, apart, last = (along[1] - along[0]) * (2 * end - 1), across[1] - across[0], float(found[axis, end])
     low, high = found[1 - axis]
@@ -267,17 +264,16 @@ def _axes(start: ClosedConfiguration, motion: PlatformMotion, plane: Pose | None
         return plane, (places[0], "phi")
     left = [part for part in parts if part in places or (part == "phi" and motion.dof > motion.shifts)]
     told = " and ".join(left) + (", which depend on each other" if len(left) > 1 else "")
-    allowed = ["fewer parts held"] if fixed else []
-    allowed += [f"for a line of poses --grid {left[0]}=-0.1:0.1:9 of check, accuracy or basins"] if left else []
+    allowed = ["fewer fixed parts"] if fixed else []
+    allowed += [f"--grid {left[0]}=-0.1:0.1:9 of check, accuracy or basins for a line of poses"] if left else []
     raise BadRequest(
-        f"{name}: a plane leaves two parts of the pose to vary, this one leaves {told or 'none'}",
-        str(plane) or "no part held",
-        "; ".join(allowed) or "single poses, or a platform that shifts",
+        f"--plane {plane}: two parts of the pose of {name} must be free, here {told or 'none'}",
+        remedy=f"Use {'; '.join(allowed) or 'single poses'}.",
     )
 
 
 def _spread(motion: PlatformMotion, pair: tuple[str, str]) -> float:
-    """How freely two coordinates of the position vary: the volume of their rows."""
+    """Volume of the rows of two position coordinates."""
     rows = motion.translations[["xyz".index(name) for name in pair]]
     return round(float(np.linalg.svd(rows, compute_uv=False).prod()), 9)
 
@@ -303,7 +299,7 @@ def _valleys(table: Array) -> list[int]:
 def _same_mode(
     start: ClosedConfiguration, at: ClosedConfiguration, observation_model: ObservationModel, motion: PlatformMotion
 ) -> bool:
-    """Whether the pose of ``at`` is singular in the working mode of ``start``, too."""
+    """Return True if the pose of ``at`` is singular in the working mode of ``start``, too."""
     try:
         there = reach(start, observation_model, motion.pose(at.pose(motion.link)), motion)
     except PoseNotReached:
@@ -321,7 +317,7 @@ def _aside(spots: Array, curve: Array, grid: Grid) -> Array:
 
 
 def _spots(grid: Grid, starts: Sequence[ClosedConfiguration], measured: MeasuredRobot) -> Array:
-    """Singular poses that lie in the plane, sought from its weakest poses."""
+    """Singular poses in the plane, searched from its poses of smallest singular value."""
     motion, observation_model = measured.setup.motion, measured.observation_model
     found: list[list[float]] = []
     for start in starts:

@@ -24,8 +24,8 @@ from ...mechanism.pose import Grid
 from .rank_descent import twists_seen
 
 HALVINGS, LEFT, FALLS = 6, 0.1, 0.75
-"""How often an edge is halved at most, which part of the value at its ends may be left, and which in its middle: half
-where the value changes evenly."""
+"""Largest number of bisections of an edge, and the fractions of the end values that may remain: at the end, and in the
+middle (half for a linear change)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ class _Weakest:
     v: Array
 
     def changes(self, other: _Weakest) -> bool:
-        """Whether the value passes through zero on the way to another place, where the vectors turn little on it."""
+        """Return True if the value passes through zero on the path to another pose, where the vectors change little."""
         return float(self.u @ other.u) * float(self.v @ other.v) < 0
 
 
@@ -80,7 +80,7 @@ class PlaneOfPoses:
         return _Weakest(at, place, float(sizes[-1]), U[:, -1], V[-1])
 
     def _zero(self, one: _Weakest, other: _Weakest) -> Array | None:
-        """Where the value passes through zero between two places; None where it does not."""
+        """Return the zero of the value between two poses; None without one."""
         least = LEFT * max(one.sigma, other.sigma)
         for _ in range(HALVINGS):
             if max(one.sigma, other.sigma) <= least:

@@ -1,4 +1,4 @@
-"""What is measured of the platform's twists, and the way to where its rank is lost, whatever a condition says."""
+"""Descent to a pose at which the relation loses rank, independent of the condition."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from ...tolerances import FOLLOWED, INVERTED, NUDGE, RANK_CUTOFF, SHARP
 
 
 def lose(start: ClosedConfiguration, observation_model: ObservationModel) -> ClosedConfiguration | None:
-    """A pose near ``start`` at which the relation itself loses its rank, on steps that follow the branch, not into
-    another operation mode; None where there is none near.
+    """Return a pose near ``start`` at which the relation loses its rank, on steps that follow the branch; None if there
+    is none near.
 
     Gauss-Newton on M(s) x, with x the twist that M sees least where s = 0 and M that of :func:`twists_seen`: its norm
     is the smallest singular value, and at a zero its slope is that with x held.
@@ -44,15 +44,15 @@ def lose(start: ClosedConfiguration, observation_model: ObservationModel) -> Clo
 
 
 def twists_seen(at: ClosedConfiguration, observation_model: ObservationModel) -> Array:
-    """What is measured of each twist of the platform and, below, the part of the twist that the platform cannot have,
-    (rows, twist rows): a matrix that follows the pose without a jump, of the rank of the relation."""
+    """Measured rates of each platform twist and, below, the part of the twist that the platform cannot have, (rows,
+    twist rows): a matrix that changes continuously with the pose, of the rank of the relation."""
     M, basis = rates_of_twists(relation(at, observation_model))
     return np.vstack([M @ basis.T, np.eye(len(basis)) - basis @ basis.T])
 
 
 def rates_of_twists(found: VelocityRelation) -> tuple[Array, Array]:
-    """What is measured of an orthonormal basis of the platform's twists, (measured rows, dof), less what idle motions
-    can make of it, and that basis (twist rows, dof)."""
+    """Measured rates of an orthonormal basis of the platform's twists, (measured rows, dof), without the part of
+    internal motions, and that basis (twist rows, dof)."""
     twists, rates = found.twist_part, found.rates
     U, s, Vt = np.linalg.svd(twists, full_matrices=False)
     kept = int(np.sum(s > RANK_CUTOFF))
@@ -65,6 +65,6 @@ def rates_of_twists(found: VelocityRelation) -> tuple[Array, Array]:
 
 
 def step_from(here: ClosedConfiguration, step: Array) -> ClosedConfiguration:
-    """Where a step (nv,) leads, closed as sharply as it can be; that it is closed its residual tells."""
+    """Configuration after a step (nv,), closed as precisely as possible; its residual shows the closure."""
     q, residual = solve(here.model, here.model.integrate(here.q, step), tolerance=SHARP)
     return ClosedConfiguration(here.model, q, residual)

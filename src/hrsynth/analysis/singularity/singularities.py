@@ -35,32 +35,32 @@ EXAMPLES = 3
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Example(OfConfiguration, Value):
-    """A singular pose constructed from the condition: the freedoms lost there, Pinocchio's smallest singular value
-    there, and the largest a centimetre away."""
+    """Singular pose constructed from the condition: unobserved dof, Pinocchio's smallest singular value there, and the
+    largest at 1 cm distance."""
 
     configuration: ClosedConfiguration
     pose: Recorded[Pose]
     unobserved: Recorded[tuple[Freedom, ...]]
     sigma: Annotated[float, As("singular_value")]
-    nearby: Annotated[float, As("singular_value_nearby"), "a centimetre away"]
+    nearby: Annotated[float, As("singular_value_nearby"), "at 1 cm distance"]
 
 
 class Measured(NamedTuple):
-    """What is measured, and of what."""
+    """Measured values, hidden or real robot."""
 
     kind: Literal["directions", "observations", "motors"]
     of: list[str]
 
 
 class Factor(NamedTuple):
-    """A factor of the expression, and what its vanishing means."""
+    """Factor of the expression, and the meaning of its zero."""
 
     expression: str
     meaning: str
 
 
 class Unchecked(NamedTuple):
-    """Where a freedom is lost everywhere, there is no condition to compare."""
+    """Check that is omitted, since a dof is unobserved everywhere."""
 
     points: int
     disagreements: int
@@ -68,8 +68,29 @@ class Unchecked(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Singularity(Result, shown_as="singularities"):
-    """Where a robot loses a freedom of its platform with respect to what is measured: what is observed, or its own
-    motors."""
+    """Type 2 condition of a robot with respect to its measured values.
+
+    Parameters
+    ----------
+    setup
+        Robot with observations and samples.
+    observation_model
+        Map from configurations to measured values and their rates.
+    real
+        True for the real robot: the measured values are its motor coordinates.
+    verdict
+        Controllability at generic configurations.
+    pattern
+        Constraints of the locked legs on the platform.
+    condition
+        Condition in words and as an expression, None if a dof is unobserved everywhere.
+    words
+        Condition, or ``always`` with the unobserved dof.
+    checked
+        Comparison of words, expression and rank, None if a dof is unobserved everywhere.
+    examples
+        Singular poses constructed from the condition.
+    """
 
     setup: ObservedRobot
     observation_model: ObservationModel
@@ -77,7 +98,7 @@ class Singularity(Result, shown_as="singularities"):
     verdict: Verdict
     pattern: ConstraintPattern
     condition: Condition | None
-    """None where a freedom is lost everywhere."""
+    """Condition, None if a dof is unobserved everywhere."""
     words: Recorded[str]
     checked: Agreement | None
     examples: Recorded[tuple[Example, ...]]
@@ -85,7 +106,7 @@ class Singularity(Result, shown_as="singularities"):
     @property
     @recorded()
     def always(self) -> bool:
-        """Whether a freedom is lost everywhere: partial controllability."""
+        """True if a dof is unobserved everywhere: partial controllability."""
         return self.condition is None
 
     @cached_property
@@ -101,7 +122,7 @@ class Singularity(Result, shown_as="singularities"):
     @property
     @recorded()
     def measured(self) -> Measured:
-        """What is measured, and of what."""
+        """Measured values, hidden or real robot."""
         seen = self.observation_model.observations
         if not self.real and not all(o.by_segment for o in seen):
             return Measured("observations", [each.leg for each in seen])
@@ -118,7 +139,7 @@ class Singularity(Result, shown_as="singularities"):
     @property
     @recorded()
     def parts(self) -> list[Factor]:
-        """The factors of the expression, and what it means that they vanish."""
+        """Factors of the expression, and the meaning of their zeros."""
         return [] if self.condition is None else [Factor(str(part), meaning) for part, meaning in self.condition.parts]
 
     characteristic_length = Shown(float, lambda self: self.setup.mechanism.length)
@@ -141,32 +162,60 @@ def singularities(
     camera: CameraLike = None,
     *,
     sensor: SeeLike = None,
-    real: Annotated[bool, option("Ask about the real robot with its own motors instead of the hidden one.")] = False,
+    real: Annotated[bool, option("Analyse the real robot with its motors instead of the hidden robot.")] = False,
     points: Annotated[
         int, option("Number of random poses at which the condition is checked.", low=1, high=10_000_000)
     ] = RANDOM_POSES,
     seed: Seed = 0,
 ) -> Singularity:
-    """Where a freedom of the platform is lost: the Type 2 condition in words, as an expression and drawn.
+    """Type 2 singularity condition of a robot, in words and as an expression.
 
-    The Type 2 condition of the hidden robot (``real``: of the real robot with its own motors), theory.md 7; MMT 3.3.
+    Parameters
+    ----------
+    robot
+        Mechanism, observed robot, path of a file, name of a shipped robot, or ``example:NAME``.
+    observe
+        Leg labels or link names; default: what the file observes, else all legs.
+    camera
+        Link that carries the camera (default: the base), or named cameras ``NAME=LINK@x,y,z/r,p,y`` (m, rad).
+    sensor
+        Other observations, ``[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius`` (m, link frame).
+    real
+        True for the real robot with its motors instead of the hidden robot.
+    points
+        Number of random reachable poses at which words, expression and rank are compared.
+    seed
+        Seed of the random configurations.
 
-    It is computed from the real robot's legs and relation, which are those of the exact lift (theory.md 3).
-    Words, expression and rank are compared at ``points`` random reachable poses and at singular poses constructed from
-    the expression; raises ``Disagreement`` if they do not agree, ``BadRequest`` if a robot has no motor, or a platform
-    that rests while segments of its legs move.
+    Returns
+    -------
+    Singularity
+        Condition, singular poses constructed from it, and the results of the comparison.
 
+    Raises
+    ------
+    BadRequest
+        If the robot has no motor (``real``), or the platform cannot move.
+    Disagreement
+        If words, expression and rank do not agree.
+
+    Notes
+    -----
+    The condition is computed from the real robot's legs and velocity relation, which is that of the exact lift
+    (docs/pages/theory.md, sections 3 and 7; MMT 3.3).
+
+    Examples
+    --------
     >>> hrsynth.singularities("rrrrr_m1", points=200)
-    <Singularity: rrrrr_m1, watching 1, 2: the tangents τ1, τ2 are parallel>
+    <Singularity: rrrrr_m1, observing 1, 2: the tangents τ1, τ2 are parallel>
     """
     setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed, driven=real)
     measured = MeasuredRobot.of(setup, real)
     observation_model, verdict = measured.observation_model, measured.verdict
     if not verdict.dof:
         raise BadRequest(
-            f"{setup.robot.name}: the platform has no freedom to lose",
-            setup.mechanism.platform,
-            "a platform that can move",
+            f"{setup.robot.name}: platform {setup.mechanism.platform!r} cannot move",
+            remedy="Choose another --platform.",
         )
     report("pattern of the legs' wrenches")
     pattern = measured.pattern
@@ -194,8 +243,8 @@ def _example(setup: ObservedRobot, observation_model: ObservationModel, at: Clos
 def neighbours(
     at: ClosedConfiguration, observation_model: ObservationModel, distance: float
 ) -> list[ClosedConfiguration]:
-    """Configurations whose platform is ``distance`` (m; of its turn, times the characteristic length) away, to both
-    sides in each of its freedoms."""
+    """Return configurations whose platform has moved by ``distance`` (m; for rotations times the characteristic
+    length), to both sides in each of its dof."""
     motion = platform_motions(at, observation_model)
     found = []
     for column in (*motion.T, *-motion.T):

@@ -1,7 +1,7 @@
-"""Anchor locus: the anchor needs only as many sliders as its locus has dimensions.
+"""Centre locus: the virtual chain needs only as many sliders as the locus of A has dimensions.
 
 PPP – T   →   (nothing) / P – T / PP – T        A is fixed / on a line / in a plane        (MMT 3.2)
-PPP – T   →   T is the link before K             that link only translates itself
+PPP – T   →   T is the link before K             that link only translates
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ Carried = tuple[VirtualChain, str | Array]
 
 
 def find(state: State, evidence: Evidence, chain: VirtualChain) -> Iterator[Match[Carried]]:
-    """The locus of the chain's anchor; nothing where that is all of space, or where the part before the observed link
-    is not a chain of its own."""
+    """Yield the locus of the chain's centre A; nothing if that is all of space, or if the part before the observed link
+    is not a separate chain."""
     proximal, reference = evidence.proximal(chain.link), state.mechanism.reference
     if proximal is None or chain.before is None:
         return
@@ -29,11 +29,11 @@ def find(state: State, evidence: Evidence, chain: VirtualChain) -> Iterator[Matc
     if proximal.translates and chain.before != reference:
         yield Match((chain, chain.before), "the link before the observed one only translates: it carries the actuator")
     elif proximal.translates or locus.dimension == 0:
-        yield Match((chain, reference), "the anchor is fixed")
+        yield Match((chain, reference), "the proximal centre is fixed")
     elif locus.dimension < 3:
         yield Match(
             (chain, locus.axes[: locus.dimension]),
-            f"the anchor moves {'on a line' if locus.dimension == 1 else 'in a plane'}",
+            f"the proximal centre moves {'on a line' if locus.dimension == 1 else 'in a plane'}",
         )
 
 
@@ -68,12 +68,12 @@ def _sliding(state: State, chain: VirtualChain, axes: Array) -> State:
 
 
 RULE = Rule(
-    "anchor locus",
+    "centre locus",
     "MMT 3.2",
     Stage.ANCHOR,
     find,
     apply,
     each_chain,
-    otherwise="the anchor moves in space, or the part before the observed link is not a chain of its own",
+    otherwise="the proximal centre moves in space, or the part before the observed link is not a separate chain",
     keeps=(LOOPS, AXES),
 )

@@ -1,7 +1,7 @@
-"""Direction locus: a direction that only turns about one axis needs one actuated R; a constant one needs none.
+"""Direction locus: a direction that only rotates about one axis needs one actuated R; a constant one needs none.
 
 T –U̲– W   →   T –R̲– W        u stays in a plane or on a cone
-chain      →   (nothing)       u is constant: the leg is blind        (MMT 3.2, 4.1.1; over the whole motion)
+chain      →   (nothing)       u is constant        (MMT 3.2, 4.1.1; over the whole motion)
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ def find(state: State, evidence: Evidence, chain: VirtualChain) -> Iterator[Matc
     index = next((i for i in own if observations[i].link == chain.link), own[0])
     found = locus(evidence.directions(index), 1.0)
     if found.dimension == 0:
-        yield Match((chain, None), "the direction is constant: the leg is blind")
+        yield Match((chain, None), "the direction is constant")
     elif found.dimension == 2:
-        yield Match((chain, found.normal), "the direction only turns about an axis of constant direction")
+        yield Match((chain, found.normal), "the direction only rotates about an axis of constant direction")
 
 
 def apply(state: State, found: Turning) -> State:
@@ -51,6 +51,6 @@ RULE = Rule(
     find,
     apply,
     each_chain,
-    otherwise="the direction moves in two ways",
+    otherwise="the direction moves with two dof",
     keeps=(LOOPS, AXES),
 )

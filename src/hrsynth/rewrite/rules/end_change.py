@@ -34,10 +34,10 @@ class LegEnds:
     beside: list[Joint]
     axes: tuple[Array, Array]
     turned: bool
-    """Whether these are not the actuator's axes: it and the parallel rods' joints are to have them as well."""
+    """True if these are not the actuator's axes: then it and the joints of the parallel rods get them as well."""
 
     def with_outer(self, trial: Array) -> LegEnds:
-        """The same with another outer axis where the actuator's axes are free."""
+        """Return the ends with another outer axis where the actuator's axes are free."""
         if not (self.chain.spins and trial.any()):
             return self
         u = self.chain.direction
@@ -47,7 +47,7 @@ class LegEnds:
 
 
 def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[list[LegEnds]] | Refusal]:
-    """All observed legs at once: a match for each direction of the outer axis."""
+    """Yield all observed legs at once: a match for each direction of the outer axis."""
     found = [ends for chain in state.chains if chain.taken and (ends := _ends(state, evidence, chain)) is not None]
     if not found:
         yield Refusal("no observed leg ends in an S whose rod the actuator moves")
@@ -65,7 +65,7 @@ def _match(found: list[LegEnds]) -> Match[list[LegEnds]]:
 
 
 def _ends(state: State, evidence: Evidence, chain: VirtualChain) -> LegEnds | None:
-    """How a leg ends; None where its actuator is no U or its ends are no S."""
+    """Return the ends of a leg; None if its actuator is no U or its ends are no S."""
     mechanism, leg = state.mechanism, state.real.leg(chain.leg)
     actuator = mechanism.joints[chain.actuator]
     ends = [

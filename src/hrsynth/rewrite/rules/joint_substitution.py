@@ -1,12 +1,11 @@
-"""Takeover, the substitution of a joint: the actuator takes the place of the real joint K before the observed link.
+"""Joint substitution: the virtual actuator replaces the real joint K before the observed link.
 
     before –K– ℓ,  T –U̲– W –R(d)– ℓ   →   before –S– T –U̲– ℓ        (MMT Fig. 2(b))
 
-K is R, U or S and, with the link before it held still, moves u over its whole locus; and either (i) ℓ can turn about
-its own direction with every other link at rest (the actuator's axes stay as they are), or (ii) K is an R, or a U whose
-first axis keeps its direction, and the actuator takes K's own axes. Where the link before turns about one constant
-direction an R carries T instead of an S; where it only translates it is T itself. Joints that slide are never taken
-over.
+K is R, U or S and alone moves u over its whole locus. In addition, either (i) ℓ can rotate about its direction
+while every other link is fixed (the actuator's axes stay), or (ii) K is an R, or a U whose first axis keeps its
+direction, and the actuator takes K's axes. Where the link before K rotates about one constant direction, an R
+carries T instead of an S; where it only translates, it is T itself. Prismatic joints are never substituted.
 """
 
 from __future__ import annotations
@@ -24,8 +23,8 @@ from ..state import State, VirtualChain, towards
 
 @dataclass(frozen=True, eq=False)
 class Substitution:
-    """How a chain's actuator takes K's place: ``own`` is K itself where the actuator takes its axes (None: the
-    actuator's stay), ``turning`` the constant axis about which the link before K turns (None: about no single one)."""
+    """Substitution of K by a chain's actuator: ``own`` is K where the actuator takes its axes (None: the actuator's
+    stay), ``turning`` the constant axis about which the link before K rotates (None: no single one)."""
 
     chain: VirtualChain
     own: Joint | None
@@ -41,11 +40,11 @@ def find(state: State, evidence: Evidence, chain: VirtualChain) -> Iterator[Matc
 def substitution(
     state: State, evidence: Evidence, chain: VirtualChain
 ) -> Iterator[Match[Substitution | None] | Refusal]:
-    """The joint K of a chain that has not taken one over; None where another chain of the leg has taken it."""
+    """Yield the joint K of a chain that has substituted none; None if another chain of the leg has substituted it."""
     if chain.taken:
         return
     if chain.k_joint is not None and chain.k_joint not in state.mechanism.joints:
-        yield Match(None, f"{chain.k_joint!r} before {chain.link!r} is taken over already")
+        yield Match(None, f"{chain.k_joint!r} before {chain.link!r} is already substituted")
         return
     if chain.link in state.watched:
         yield Refusal(f"{chain.link!r} carries a camera or another observation")
@@ -60,12 +59,12 @@ def substitution(
         return
     found = Substitution(chain, None, proximal.turning_axis)
     if K.type is not JointType.REVOLUTE and evidence.can_spin(chain.link, chain.direction):
-        yield Match(found, f"{chain.link!r} can turn about its own direction with all else at rest")
+        yield Match(found, f"{chain.link!r} can rotate about its own direction while all other links are fixed")
     else:
         yield Match(
             found,
-            "done without its side condition",
-            unmet=f"{chain.link!r} cannot turn about its own direction, and {K.name!r} is not an R or a U "
+            "applied without its side condition",
+            unmet=f"{chain.link!r} cannot rotate about its own direction, and {K.name!r} is not an R or a U "
             "whose axes the actuator could take",
         )
 
@@ -113,4 +112,4 @@ def apply(state: State, found: Substitution | None) -> State:
     )
 
 
-RULE = Rule("takeover", "MMT 3.2, Fig. 2(b)", Stage.JOINT, find, apply, each_chain, keeps=(LOOPS, AXES))
+RULE = Rule("joint substitution", "MMT 3.2, Fig. 2(b)", Stage.JOINT, find, apply, each_chain, keeps=(LOOPS, AXES))

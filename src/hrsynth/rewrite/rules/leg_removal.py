@@ -23,10 +23,10 @@ def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[str] | Re
         yield Refusal("the leg carries the camera")
         return
     if state.mechanism.formation:
-        yield Refusal("the joints of a formation say what its bodies can do")
+        yield Refusal("the joints of a formation define how its links can move")
         return
     if state.watched & set(own.links) or state.actuators & set(own.joints):
-        yield Refusal("the leg carries what is observed or sees")
+        yield Refusal("the leg carries an observed link or a camera")
         return
     observed = state.observed_labels()
     ends = dict.fromkeys(each.platform_link for each in state.real.legs if each.label in observed)
@@ -56,5 +56,5 @@ RULE = Rule(
     find,
     apply,
     whole_leg,
-    keeps=("the wrenches of removed legs are among those of the rest",),
+    keeps=("the wrenches of removed legs are among those of the others",),
 )

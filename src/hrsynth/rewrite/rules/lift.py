@@ -27,8 +27,8 @@ SEGMENT = ("slide_x", "slide_y", "slide_z", "virtual", "roll"), ("guide_x", "gui
 
 @dataclass(frozen=True, eq=False)
 class LiftedChain:
-    """A chain to be hung between ``reference`` and ``link``, of an observation of the label ``leg``; ``proximal`` is
-    the part before ℓ, None for what is no direction of a segment; ``tag`` tells the chain's names from others."""
+    """Virtual chain between ``reference`` and ``link`` for an observation with the label ``leg``. ``proximal`` is the
+    part before ℓ, None unless a segment's direction is observed; ``tag`` makes the chain's names unique."""
 
     leg: str
     tag: str
@@ -40,7 +40,7 @@ class LiftedChain:
 
 
 def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[list[LiftedChain | Encoder]]]:
-    """One match for each leg: a chain for each of its observations."""
+    """Yield one match for each leg: a chain for each of its observations."""
     found: list[LiftedChain | Encoder] = []
     for index, observation in enumerate(evidence.samples.observation_model.observations):
         if observation.leg != leg:
@@ -57,14 +57,14 @@ def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[list[Lift
         if isinstance(each, Encoder)
         else "PPP-U̲-R(d) from the reference link to the observed link constrains nothing"
         if each.segment
-        else "a chain of six freedoms from the reference link to the observed link constrains nothing"
+        else "a chain of six dof from the reference link to the observed link constrains nothing"
         for each in found
     )
     yield Match(found, "; ".join(words))
 
 
 def _segment(state: State, evidence: Evidence, seen: Observation, index: int, tag: str) -> LiftedChain:
-    """The chain of a direction, its anchor A where the leg's joint K is."""
+    """Return the chain of a direction, with the proximal centre A where the leg's joint K is."""
     assert isinstance(seen, SeenAxis)
     links, reference = state.mechanism.links, state.mechanism.reference
     link = evidence.carrier(seen.link)
@@ -75,7 +75,7 @@ def _segment(state: State, evidence: Evidence, seen: Observation, index: int, ta
 
 
 def _sensor(state: State, evidence: Evidence, seen: Observation, index: int, tag: str) -> LiftedChain:
-    """The chain of any other observation."""
+    """Return the chain of any other observation."""
     assert isinstance(seen, SeenAxis | CameraObservation)
     links, reference = state.mechanism.links, seen.seen_from or state.mechanism.reference
     at = seen.sighting(links[reference].pose, links[seen.link].pose, evidence.far(index))

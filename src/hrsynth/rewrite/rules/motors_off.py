@@ -15,7 +15,7 @@ from ..state import State
 
 
 def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[list[Joint]]]:
-    """All motors of all legs at once."""
+    """Yield all motors of all legs at once."""
     driven = [joint for joint in state.mechanism.joints.values() if joint.actuated]
     count = sum(joint.type.freedoms for joint in driven)
     yield Match(
@@ -29,7 +29,7 @@ def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[list[Join
 
 
 def apply(state: State, driven: list[Joint]) -> State:
-    """The same joints without motors."""
+    """Return the state without motors."""
     return replace(state, mechanism=state.mechanism.changed(joints=[replace(joint, motor=None) for joint in driven]))
 
 

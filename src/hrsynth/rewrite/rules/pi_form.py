@@ -20,7 +20,7 @@ from ..rule import Match, Refusal, Rule, Stage, each_chain
 from ..state import State, VirtualChain
 
 Circling = tuple[VirtualChain, Joint]
-"""A chain, and the base R about which its anchor moves on a circle."""
+"""Chain, and the base R about which its centre A moves on a circle."""
 
 
 def find(state: State, evidence: Evidence, chain: VirtualChain) -> Iterator[Match[Circling] | Refusal]:
@@ -29,9 +29,9 @@ def find(state: State, evidence: Evidence, chain: VirtualChain) -> Iterator[Matc
     if proximal is None or len(chain.sliders) != 2:
         return
     if proximal.single_revolute is None:
-        yield Refusal("the anchor is not on a circle about a base R joint")
+        yield Refusal("the proximal centre is not on a circle about a base R joint")
         return
-    yield Match((chain, proximal.single_revolute), "the anchor moves on a circle about a base R joint")
+    yield Match((chain, proximal.single_revolute), "the proximal centre moves on a circle about a base R joint")
 
 
 def apply(state: State, found: Circling) -> State:

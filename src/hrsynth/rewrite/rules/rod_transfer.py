@@ -1,6 +1,6 @@
-"""Companion: the parallel rod beside an observed one moves to T as well.
+"""Rod transfer: the rod parallel to an observed one moves to T as well.
 
-before –S– rod b   →   T –U– rod b        the vector between the two balls keeps its direction        (MMT Fig. 13)
+before –S– rod b   →   T –U– rod b        the vector between the two S keeps its direction        (MMT Fig. 13)
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ def find(state: State, evidence: Evidence, chain: VirtualChain) -> Iterator[Matc
         kept = all(proximal.keeps(joint.point - chain.anchor) for joint in rods.values())
         yield Match(
             (chain, list(rods.values())),
-            f"{', '.join(map(repr, rods))} keeps its place beside the observed rod",
-            None if kept else "the vector between the two rods' joints changes its direction",
+            f"{', '.join(map(repr, rods))} stays parallel to the observed rod",
+            None if kept else "the vector between the two rods' joints changes direction",
         )
 
 
@@ -51,4 +51,4 @@ def apply(state: State, found: Beside) -> State:
     return state.with_chain(chain, chain, mechanism.changed(joints=moved))
 
 
-RULE = Rule("companion", "MMT Fig. 13", Stage.BESIDE, find, apply, each_chain, keeps=(LOOPS, AXES))
+RULE = Rule("rod transfer", "MMT Fig. 13", Stage.BESIDE, find, apply, each_chain, keeps=(LOOPS, AXES))
