@@ -86,7 +86,7 @@ def _repeat_step(
 
 
 def _store(kernel: Kernel, table: Table, numbers: Any) -> Table:
-    """What a kernel puts at its places."""
+    """Return the table with a kernel's results."""
     import jax.numpy as jnp
 
     values: dict[int, Any] = {}

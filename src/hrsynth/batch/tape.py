@@ -124,7 +124,7 @@ class Tape:
         return self._find(operation)
 
     def load(self, place: int) -> Symbol:
-        """What stands at a place."""
+        """Return the symbol at a place."""
         return self._find(("load", place))
 
     def place(self, value: Any) -> int | None:
@@ -153,7 +153,7 @@ class Tape:
         return [each for each in operation[1:] if isinstance(each, int)]
 
     def are_constant(self) -> list[bool]:
-        """Which operations are on the robot's numbers alone: the same at all poses."""
+        """Return True for operations on the robot's numbers alone: the same at all poses."""
         found: list[bool] = []
         for operation in self.code:
             found.append(operation[0] != "load" and all(found[each] for each in self.arguments(operation)))

@@ -44,7 +44,7 @@ class FreeMotor(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ExportedCode(Result, shown_as="export"):
-    """A program, its language, and the proof on which it rests; ``legs`` are those whose directions it gives."""
+    """Program, its language, and the proof behind it; ``legs`` are those whose directions it gives."""
 
     proof: BranchProof
     lang: Annotated[str, Literal["c++", "numpy"]]
@@ -66,7 +66,7 @@ class ExportedCode(Result, shown_as="export"):
 
     @property
     def setup(self) -> Any:
-        """What is compared besides the record."""
+        """Setup compared besides the record."""
         return self.proof.robot
 
     def headline(self) -> str:
@@ -82,7 +82,7 @@ class ExportedCode(Result, shown_as="export"):
     @property
     @recorded()
     def inverse(self) -> Literal["closed form", "Newton's method"]:
-        """How the program finds the motors of a pose."""
+        """Method by which the program computes the motors of a pose."""
         return "closed form" if self.closed else "Newton's method"
 
     @property
@@ -94,7 +94,7 @@ class ExportedCode(Result, shown_as="export"):
     @property
     @recorded()
     def error(self) -> float | None:
-        """How far an answer is off at most (rad, 1, characteristic lengths; proved), or null."""
+        """Largest error of a result (rad, 1, characteristic lengths; proved), or null."""
         return self.bounds.error if self.bounds else None
 
     @property
@@ -162,8 +162,8 @@ def export(
 
 
 def _watched_directions(robot: Any, observe: LegsLike, camera: CameraLike) -> tuple[Direction, ...]:
-    """The watched directions that are seen from the base; by default none where a robot has no legs to watch. Raises
-    ``BadRequest`` where something else is observed."""
+    """Return the observed directions, as seen from the base; by default none if a robot has no observable legs. Raises
+    ``BadRequest`` if something else is observed."""
     try:
         observed = ObservedRobot.of(robot, observe, camera)
     except HrsynthError:
@@ -196,7 +196,7 @@ def _free(proof: BranchProof, branch_: TubedBranch) -> tuple[FreeMotor, ...]:
 def _describe_program(
     proof: BranchProof, source: Source, lang: str, box: BoxLike | None, max_cells: int, camera: tuple[str, ...]
 ) -> list[str]:
-    """What the program says of itself."""
+    """Return the header of the program: robot, ranges, what is proved and what is checked."""
     from ..version import __version__
 
     robot, branch_ = proof.robot, source.branch
@@ -262,7 +262,7 @@ def _describe_program(
 
 
 def _bounds(source: Source) -> list[str]:
-    """What is proved of Newton's method in it."""
+    """Return the proved bounds of Newton's method in it."""
     if source.bounds is None:
         return ["How many steps are enough, and how far answers can be off, is not proved in all cells."]
     bounds = source.bounds

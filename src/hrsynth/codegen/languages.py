@@ -61,7 +61,7 @@ def namespace(name: str) -> str:
 
 @cache
 def _c_names() -> frozenset[str]:
-    """What the C library calls its functions."""
+    """Return the names of the C library's functions."""
     text = Path(__file__).with_name("c_names.toml").read_text(encoding="utf-8")
     return frozenset(tomllib.loads(text)["names"].split())
 

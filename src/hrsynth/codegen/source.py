@@ -1,4 +1,4 @@
-"""What the text of a program is made of, for all languages: the parts of a branch with their formulas and cells."""
+"""Contents of a program, for all languages: the parts of a branch with their formulas and cells."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class ProvedBounds:
 
     @property
     def more(self) -> str:
-        """What is tested, in words."""
+        """Further tests, in words."""
         return (
             "one more equation of the loops holds"
             if self.others == 1
@@ -74,7 +74,7 @@ class ProvedBounds:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Source(Value):
-    """All that a program says of a branch."""
+    """Contents of the program of a branch."""
 
     branch: TubedBranch
     parts: tuple[SourcePart, ...]

@@ -26,7 +26,7 @@ from .noise import NoiseSamples
 VIEWS = 200
 """Places around the legs that are tried for a camera."""
 MARGIN = 0.85
-"""Part of the picture, from its middle, in which all legs are to lie."""
+"""Fraction of the image, from its centre, in which all legs must lie."""
 SHORTEST, HALF = 0.05, 0.25
 """Rods shorter than this part of the robot's length are drawn with this half-length instead."""
 
@@ -56,11 +56,11 @@ class Camera(Value):
         return np.asarray(rod.ends @ X[:3, :3].T + X[:3, 3])
 
     def pixels(self, points: Array) -> Array:
-        """Where points (n, 3) of the camera's frame are in the picture, (n, 2)."""
+        """Return the image coordinates (n, 2) of points (n, 3) in the camera frame."""
         return self.focal * points[:, :2] / points[:, 2:] + np.array([self.width, self.height]) / 2
 
     def ray(self, pixel: Array) -> Array:
-        """The ray (3,), z = 1, through a place (2,) in the picture."""
+        """Return the ray (3,), z = 1, through an image point (2,)."""
         return np.array([*(pixel - np.array([self.width, self.height]) / 2) / self.focal, 1.0])
 
 
@@ -106,8 +106,8 @@ def cylinders(mechanism: Mechanism, observations: Sequence[Observation]) -> tupl
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Edges(Value):
-    """Directions rebuilt from the edges of the legs in the picture, each edge known by two points in it that are wrong
-    by up to ``pixels`` across the edge."""
+    """Directions computed from the edges of the legs in the image. Each edge is given by two image points with errors
+    of up to ``pixels`` across the edge."""
 
     camera: Camera
     reference: str
@@ -144,8 +144,8 @@ def _move_edge(normal: Array, ends: Array, shift: Array) -> Array:
 def place_camera(
     rods: Sequence[Cylinder], reference: str, poses: Sequence[Poses], blank: Camera | None = None
 ) -> Camera:
-    """A camera on the reference link from which all rods lie in the picture at all given poses, where the rebuilt
-    directions suffer least from errors of pixels: among places on a sphere of directions around them."""
+    """Return a camera on the reference link whose image contains all rods at all given poses. Of the positions on a
+    sphere around the rods it is the one at which pixel errors change the computed directions least."""
     ends = np.array([rods_in_frame(rods, reference, X) for X in poses])
     best, found = np.inf, Camera(np.eye(4))
     for ahead in _sphere(VIEWS):
@@ -164,7 +164,7 @@ def rods_in_frame(rods: Sequence[Cylinder], reference: str, poses: Poses) -> Arr
 
 
 def facing(points: Array, ahead: Array, right: Array, blank: Camera | None = None) -> Camera:
-    """The camera that looks along ``ahead``, so far back that all points (…, 3) lie in its picture."""
+    """Return the camera that looks along ``ahead`` from the distance at which its image contains all points (…, 3)."""
     blank = Camera(np.eye(4)) if blank is None else blank
     middle = points.reshape(-1, 3).mean(axis=0)
     R = np.column_stack([right, np.cross(ahead, right), ahead])
@@ -175,8 +175,8 @@ def facing(points: Array, ahead: Array, right: Array, blank: Camera | None = Non
 
 
 def sensitivity(ends: Array, radius: float) -> float:
-    """How far (rad) the rebuilt direction of a rod turns for each radian by which the ends of its two edges are wrong,
-    all at their worst; infinite where the camera is inside the rod."""
+    """Return the largest rotation (rad) of a rod's computed direction per radian of error at the ends of its two edges;
+    infinite if the camera is inside the rod."""
     try:
         normals = edges(ends, radius)
     except BadRequest:

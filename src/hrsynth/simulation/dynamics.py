@@ -50,7 +50,8 @@ class DynamicSimulation:
 
     @classmethod
     def of(cls, setup: ObservedRobot, start: ClosedConfiguration) -> DynamicSimulation:
-        """The bench; raises ``MissingExtra``, and ``BadRequest`` where the robot's motors do not move all of it."""
+        """Build the dynamic simulation; raises ``MissingExtra``, and ``BadRequest`` if the motors do not determine the
+        robot's motion."""
         simulator("the dynamic simulation")
         observation_model = motors(setup)
         if relation(start, observation_model).unobserved_twists.shape[1]:
@@ -114,7 +115,7 @@ class DynamicSimulation:
         return run, displacement(data, self.setup.motion.link)
 
     def _is_settled(self, loop: Loop, commands: list[Command]) -> bool:
-        """Whether the error vanishes, or has stayed as it is for a time constant 1 / λ."""
+        """Return True if the error vanishes, or has been constant for a time constant 1 / λ."""
         now, back = commands[-1].size, round(1 / (loop.law.gain * SAMPLE))
         if now < BENCH_SETTLED:
             return True
@@ -143,8 +144,8 @@ class DynamicSimulation:
 def read_encoders(
     start: ClosedConfiguration, at: ClosedConfiguration, places: list[int], moved: Array
 ) -> ClosedConfiguration | None:
-    """The configuration next to ``at`` to which these motors have moved since the start; None where there is none. What
-    more motors say than how they can move together is left out."""
+    """Return the configuration next to ``at`` with these motor displacements since the start; None if there is none.
+    Displacements that coupled motors cannot have are projected out."""
     free, _ = range_basis(at.kernel()[0][places], 1.0)
     chart = TangentChart(start, np.eye(at.model.nv)[:, places] @ free)
     try:

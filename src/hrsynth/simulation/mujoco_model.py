@@ -50,13 +50,13 @@ class MujocoModel:
 
     @property
     def radius(self) -> float:
-        """Of the rods (m)."""
+        """Radius of the rods (m)."""
         return RADIUS * self.mechanism.length
 
 
 def mockup(mechanism: Mechanism) -> str:
-    """The MJCF of a mechanism that is to move from its zero configuration under gravity along −z; motors are named as
-    their joints. Raises ``BadMechanism`` for a joint that leaves all six freedoms."""
+    """Return the MJCF of a mechanism that moves from its zero configuration under gravity along −z; motors are named as
+    their joints. Raises ``BadMechanism`` for a joint with six dof."""
     made = MujocoModel(mechanism)
     root = made.root
     root.set("model", mechanism.name)
@@ -102,7 +102,7 @@ def _cut(mechanism: Mechanism) -> tuple[list[tuple[Joint, str]], list[Joint]]:
 
 
 def coordinates(joint: Joint) -> Iterator[tuple[str, str, Array]]:
-    """Name, type (hinge, slide or ball) and axis of the simulated joints that make up a joint."""
+    """Yield name, MJCF type and axis of the simulated joints that make up a joint."""
     if joint.type is JointType.SPHERICAL:
         yield joint.name, "ball", np.array([0.0, 0.0, 1.0])
         return

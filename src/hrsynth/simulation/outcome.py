@@ -1,5 +1,5 @@
-"""Where a run ended, in the words of docs/pages/proofs.md, section 11: goal, mode, antipodal, local minimum, boundary,
-lost from sight, time; or undecided."""
+"""Outcome of a run, in the words of docs/pages/proofs.md, section 11: goal, assembly mode, antipodal, local minimum,
+limit reached, out of view, time, undecided."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ ENDINGS = (GOAL, MODE, ANTIPODAL, MINIMUM, BOUNDARY, SIGHT, TIME, UNDECIDED)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RunOutcome(Value):
-    """How a run ended and why that is its name; ``matched`` is the number of the assembly mode, counted from 1 in the
-    list of all modes of the goal's directions (None if it is none of them, or if they cannot be listed)."""
+    """Outcome of a run and its reason; ``matched`` is the number of the assembly mode, counted from 1 in the list of
+    all modes of the goal's directions (None if it is none of them, or if they cannot be listed)."""
 
     name: Annotated[str, As("ended")]
     reason: Recorded[str]
@@ -40,14 +40,14 @@ class RunOutcome(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OutcomeClassifier(Value):
-    """Names endings by the goal's configuration and measured values."""
+    """Classifier of outcomes by the goal's configuration and measured values."""
 
     setup: ObservedRobot
     goal: ClosedConfiguration
     wanted: Measures
 
     def classify(self, run: Run, values: Measures) -> RunOutcome:
-        """The ending of a run at whose end these values are measured."""
+        """Return the outcome of a run with these values measured at its end."""
         last = run.commands[-1]
         if run.stopped == SERVED_AT:
             return self._serve(run.last, values)
@@ -88,7 +88,7 @@ class OutcomeClassifier(Value):
         return RunOutcome(TIME, f"{over}, with ‖e‖ = {last.size:.3g}{way}")
 
     def _near(self, at: ClosedConfiguration, size: float) -> str:
-        """Which near mode of the goal a rest is, if any."""
+        """Return a text on the near mode of the goal at an equilibrium, if any."""
         motion = self.setup.motion
         try:
             listed = modes(self.setup, at=motion.pose(self.goal.pose(motion.link))) if size < NEAR_MODE else None
@@ -108,7 +108,7 @@ class OutcomeClassifier(Value):
         )
 
     def _unseen(self, at: ClosedConfiguration) -> str:
-        """What a camera has lost."""
+        """Return a text on the observation that leaves its camera's field of view."""
         reference = self.setup.mechanism.reference
         first = min(self.setup.observed, key=lambda o: o.in_front(at.pose(o.seen_from or reference), at.pose(o.link)))
         return f"{first.kind} {first.leg} leaves the camera's sight"
@@ -148,7 +148,7 @@ class OutcomeClassifier(Value):
         )
 
     def same_pose(self, at: ClosedConfiguration, X: Array) -> bool:
-        """Whether the platform of a configuration is at X (4, 4), to ``SAME_RELATION``."""
+        """Return True if the platform of a configuration is at X (4, 4), to ``SAME_RELATION``."""
         return self._alike(at.pose(self.setup.motion.link), X, self.setup.decomposition.point)
 
     def _alike(self, X: Array, other: Array, point: Array | None) -> bool:
@@ -156,7 +156,7 @@ class OutcomeClassifier(Value):
 
 
 def rest(setup: ObservedRobot, at: ClosedConfiguration, last: Command) -> RunOutcome:
-    """What a configuration is at which the command vanishes but the error does not: a singularity of the hidden robot,
+    """Classify a configuration at which the command vanishes but the error does not: a singularity of the hidden robot,
     the limit of a leg's reach, or neither."""
     posture = ConfigurationAnalysis.of(setup).classify(at)
     where = f"‖e‖ = {last.size:.3g} and the command vanishes"

@@ -1,4 +1,4 @@
-"""What is told of a servo run: where it started, went and ended, and what was measured on the way."""
+"""Result of a servo run: start, path, end, and the measurements along the run."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ ASIDE = 0.9
 
 @dataclass(frozen=True)
 class Scatter(Record, all_recorded=True):
-    """How far the platform was from the pose at which it settled, over the second half of a noisy run: metres and
+    """Distance of the platform from the pose at which it settled, over the second half of a noisy run: metres and
     radians, largest and root mean square."""
 
     metres: Annotated[float, As("position_mm", scale=MM)]
@@ -42,16 +42,16 @@ class Scatter(Record, all_recorded=True):
 
     @property
     def aside(self) -> bool:
-        """Whether noise shifts the platform rather than shaking it."""
+        """Return True if noise shifts the platform instead of shaking it."""
         return self.offset > ASIDE * self.rms_metres
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Servo(Result, shown_as="servo"):
-    """A servo run: what was asked, the run, its ending, what it passed.
+    """Servo run: request, run, outcome, crossings.
 
-    With noise the ending is that of the same loop without noise, continued from where the noisy run stopped; ``spread``
-    is how far the noisy run stayed from there.
+    With noise the outcome is that of the same loop without noise, continued from the end of the noisy run; ``spread``
+    is the distance of the noisy run from there.
     """
 
     setup: Annotated[ObservedRobot, FLAT]
@@ -70,7 +70,7 @@ class Servo(Result, shown_as="servo"):
     """The goal's configuration."""
     spread: Recorded[Scatter | None] = None
     notes: Recorded[tuple[str, ...]] = ()
-    """What a bench measured, in words."""
+    """Notes on what the dynamic simulation and noise changed."""
 
     def headline(self) -> str:
         """The robot and where the run ended."""
@@ -78,7 +78,7 @@ class Servo(Result, shown_as="servo"):
 
     @property
     def outcome(self) -> str:
-        """Where it ended: one of ``ending.ENDINGS``."""
+        """Return the outcome: one of ``outcome.ENDINGS``."""
         return self.run_outcome.name
 
     @property
@@ -107,7 +107,7 @@ class Servo(Result, shown_as="servo"):
 
     @property
     def turns(self) -> Array:
-        """How far the platform is turned away from the goal along the run (rad), (n,); of a point body zero."""
+        """Rotation of the platform from the goal along the run (rad), (n,); zero for a point."""
         return np.array([self._turn(at) for at in self.run.configurations])
 
     @property
@@ -118,7 +118,7 @@ class Servo(Result, shown_as="servo"):
 
     @property
     def from_goal(self) -> tuple[float, float]:
-        """How far the pose at which it ended is from the goal: metres, radians."""
+        """Return the distance of the final pose from the goal: metres, radians."""
         motion = self.setup.motion
         moved = motion.position(self.settled.pose(motion.link)) - self.goal_position
         return float(np.linalg.norm(moved)), self._turn(self.settled)

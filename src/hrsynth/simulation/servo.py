@@ -62,7 +62,7 @@ LENGTHS, VALUES = ("lengths", " mm"), ("values", "")
 
 @dataclass(frozen=True)
 class Conditions:
-    """How a robot is servoed; :func:`servo` takes each of these by its name. Raises ``BadRequest``."""
+    """Conditions of a servo run; :func:`servo` takes each of these by its name. Raises ``BadRequest``."""
 
     gain: Annotated[float, option("λ of the control law (1/s).", high=1e6)] = GAIN
     """λ of the control law (1/s)."""
@@ -80,8 +80,8 @@ class Conditions:
     noise: Annotated[
         Noise | str | None, option("Errors of measurements, such as 0.1deg, 0.3px (in images) or 1mm.", "AMOUNT")
     ] = None
-    """How wrong it is: angles as ``0.1deg``, what is found in a picture as ``0.3px``, lengths as ``1mm``; or several,
-    as ``0.3px,1mm``."""
+    """Measurement errors: angles as ``0.1deg``, image points as ``0.3px``, lengths as ``1mm``; or several, as
+    ``0.3px,1mm``."""
     bias: Annotated[bool, option("Keep the error of each measurement constant.")] = False
     """Whether the errors of ``noise`` stay as they are at first."""
     lens: Camera | None = None
@@ -134,12 +134,12 @@ class Conditions:
 
     @property
     def noisy(self) -> bool:
-        """Whether measured directions are wrong."""
+        """Return True if measurements have errors."""
         return self.sense != EXACT or self.noise is not None
 
     @property
     def horizon(self) -> float:
-        """How long a run may take (s)."""
+        """Longest duration of the run (s)."""
         lasts = NOISY_LASTS if self.noisy or self.dynamics else LASTS
         return self.time or (self.duration or 0.0) + lasts / self.gain
 
@@ -224,7 +224,7 @@ class ServoTask:
         conditions: Conditions = Conditions(),
         seed: int = 0,
     ) -> ServoTask:
-        """The same between two configurations."""
+        """Build the task between two configurations."""
         require_seen(setup)
         motion, ends = setup.motion, [start, goal]
         observation_model = setup.samples.observation_model
@@ -249,11 +249,11 @@ class ServoTask:
 
     @property
     def directions(self) -> Array:
-        """The same where all are directions, (k, 3)."""
+        """Desired directions (k, 3), if all are directions."""
         return np.array(self.wanted)
 
     def run(self) -> Servo:
-        """What comes of it."""
+        """Simulate the run."""
         given = self.conditions
         sensed = self.sense() if given.noisy else None
         loop = self.loop(sensed, smooth=not given.noisy or (given.amount is not None and given.amount.bias))
@@ -273,7 +273,7 @@ class ServoTask:
         )
 
     def sense(self) -> Sense:
-        """What measures, and how wrong."""
+        """Return the sensor with its errors."""
         given, observation_model = self.conditions, self.law.observation_model
         noise = given.amount
         if given.sense == EXACT and noise is not None:
@@ -290,12 +290,13 @@ class ServoTask:
         return RenderedImages(LegRenderer(mechanism, eye, observation_model.reference, rods))
 
     def result(self, run: Run, simulated: Array | None = None) -> Servo:
-        """What came of a run; ``simulated`` is the displacement (4, 4) of the platform on the dynamic simulation."""
+        """Build the result of a run; ``simulated`` is the displacement (4, 4) of the platform in the dynamic
+        simulation."""
         setup, motion, given = self.setup, self.setup.motion, self.conditions
         still = run
         over = run.stopped in OVER
         if (given.noisy or simulated is not None) and not over:
-            # where the loop without noise and dynamics goes on to: its ending is the one that is told
+            # the loop without noise and dynamics continues from here: its outcome is reported
             still = Loop(self.law, setup.all_samples.observation_model, FixedDirections(self.wanted)).simulate(
                 run.last, LASTS / self.law.gain
             )
@@ -323,7 +324,7 @@ class ServoTask:
         )
 
     def _notes(self, run: Run, still: Run, simulated: Array | None) -> Iterator[str]:
-        """What the run leaves out, and what was measured on the benches."""
+        """Yield notes on what the run ignores, and on what noise and dynamics changed."""
         model = self.goal.model
         for name, at in (("start", self.start), ("goal", self.goal)):
             if beyond := outside(model, at.q):
@@ -379,7 +380,7 @@ class ServoTask:
 
 
 def require_seen(setup: ObservedRobot) -> None:
-    """Raise ``BadRequest`` where the observed legs do not see all of the platform's freedoms."""
+    """Raise ``BadRequest`` unless all platform dof are observed."""
     sees_all(setup, "")
     if any(member.relation.RI for member in setup.samples.members):
         raise BadRequest(
@@ -390,7 +391,7 @@ def require_seen(setup: ObservedRobot) -> None:
 
 
 def _unit(seen: Observation, noise: Set[str] | None) -> tuple[str, str] | None:
-    """In what it is told how wrong a measured value is; None where it is exact."""
+    """Return the quantity and unit of an observation's measurement error; None if it is exact."""
     own = seen.found_by if noise is None else seen.found_by & noise
     if not own:
         return None
@@ -404,7 +405,7 @@ def _unit(seen: Observation, noise: Set[str] | None) -> tuple[str, str] | None:
 
 
 def _off(kind: tuple[str, str], seen: Observation, value: Array, true: Array) -> float:
-    """How far a measured value is off the true one, lengths over a characteristic length."""
+    """Return the deviation of a measured value from the true one, lengths over a characteristic length."""
     if kind in (DIRECTIONS, ANGLES) and seen.size == 3:
         return math.degrees(np.arccos(np.clip(value @ true, -1, 1)))
     off = float(np.linalg.norm(seen.error(value, true)))
@@ -420,7 +421,7 @@ def _name_ends(ends: Sequence[ClosedConfiguration]) -> list[tuple[str, ClosedCon
 
 
 def require_sight(setup: ObservedRobot, law: Law, name: str, at: ClosedConfiguration) -> None:
-    """Raise ``BadRequest`` where something that a camera is to see is behind it, or outside of its picture."""
+    """Raise ``BadRequest`` if an observed feature is behind its camera, or outside of its image."""
     for seen in setup.observed:
         X = at.pose(seen.seen_from or law.observation_model.reference)
         if seen.in_front(X, at.pose(seen.link)) < SEEN_ABOVE:

@@ -1,5 +1,5 @@
-"""Where runs to one goal end, from each start of a line, plane or box of poses: many abreast where the batch knows the
-robot, else one by one."""
+"""Basins of attraction: outcomes of the runs to one goal from each start of a line, plane or box of poses. Runs are
+batched if the closed forms cover the robot, else simulated separately."""
 
 from __future__ import annotations
 
@@ -56,21 +56,21 @@ from .flow import Flags, Flow, Places
 from .outcomes import Outcome, OutcomeCount, Outcomes
 
 SIDE, SIDE_ONE_BY_ONE = 100, 15
-"""Starts along each side of a plane, abreast and one by one."""
+"""Starts along each side of a plane: batched, and simulated separately."""
 REGION, REGION_SIDE = 1.1, (0, 401, 81, 25)
 """Half the width over which what is certified is drawn, in its radii, and the poses along each side, by the number of
 parts that vary."""
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
-"""Names of the ends in text and picture."""
+"""Letters of the outcomes in text and figure."""
 NOT_REACHED = -1
 """The number of a start at which the robot cannot be."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BasinEnd(Value):
-    """Where runs end: the ``ending`` of one of them, simulated separately; the platform's pose X (4, 4) and ‖e‖ if they
-    come to rest at one pose; how many starts, and what share of all, end there; ``example`` is the pose of one of them,
-    as ``servo`` takes it."""
+    """Outcome of some runs: the ``ending`` of one of them, simulated separately; the platform's pose X (4, 4) and ‖e‖
+    if they converge to one pose; their number and fraction; ``example`` is the pose of one of the starts, as ``servo``
+    takes it."""
 
     run_outcome: Annotated[RunOutcome, FLAT]
     pose: Recorded[Pose | None]
@@ -94,10 +94,13 @@ class CertifiedPart(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Basins(Result, shown_as="basins"):
-    """Where runs from each pose of a grid end: ``cells`` holds the number of the end, in the grid's shape, −1 where the
-    robot cannot start; ``damped`` the starts whose runs meet a singularity, where the law is damped. ``abreast`` says
-    whether they were integrated together; ``followed`` of them were then simulated one by one because that could not
-    continue, and of ``checked`` others ``agreed`` ended at the same pose."""
+    """Outcome of the run from each pose of a grid.
+
+    ``cells`` has the number of the outcome, in the grid's shape, −1 if the robot cannot start there; ``damped`` the
+    starts whose runs meet a singularity, where the law is damped. ``batched``: runs were integrated together;
+    ``followed`` of them were then simulated separately because that could not continue, and of ``checked`` others
+    ``agreed`` ended at the same pose.
+    """
 
     setup: Annotated[ObservedRobot, FLAT]
     goal: Recorded[Pose]
@@ -142,7 +145,7 @@ class Basins(Result, shown_as="basins"):
 
     @property
     def covered(self) -> float:
-        """How much of the goal's basin, as far as it is drawn, is certified."""
+        """Return the fraction of the goal's basin, as far as the grid covers it, that is proved."""
         goal = next((i for i, each in enumerate(self.ends) if each.run_outcome.name == GOAL), None)
         if self.region is None or goal is None:
             return 0.0
@@ -153,7 +156,8 @@ class Basins(Result, shown_as="basins"):
         return float(sizes[0] / sizes[1])
 
     def members(self, listed: Equilibria) -> tuple[int | None, ...]:
-        """The place of each end in a list of rests with the same goal; None where it is not on the list, or no rest."""
+        """Return the index of each outcome in a list of equilibria with the same goal; None if it is not on the list,
+        or no equilibrium."""
         length, link = self.target.model.length, self.setup.motion.link
         rests = [(rest.configuration.pose(link), rest.error) for rest in listed.points]
         return tuple(
@@ -182,7 +186,7 @@ class Basins(Result, shown_as="basins"):
     @property
     @recorded(As("certified"))
     def certified_record(self) -> CertifiedPart | None:
-        """What is certified; None where nothing was sought."""
+        """Return the proved part; None if no proof was tried."""
         return None if self.certified is None else CertifiedPart(self.certified, self.covered)
 
 
@@ -259,7 +263,7 @@ class BasinSearch:
 
     @cached_property
     def flow(self) -> Flow | None:
-        """The law abreast; None where something hinders it."""
+        """Batched law; None if something prevents it."""
         setup = self.setup
         if setup.placer is None or hindrances(setup):
             return None
@@ -323,14 +327,14 @@ class BasinSearch:
         )
 
     def _example(self, X: Array) -> Pose:
-        """Of the starts X (n, 4, 4) that end alike the one nearest to their middle, if small steps lead there from the
-        zero configuration; else the nearest to which they do, of the first few."""
+        """Return one of the starts X (n, 4, 4) with the same outcome: the nearest to their centre, if small steps lead
+        there from the zero configuration; else the nearest of the first few to which they do."""
         away = np.linalg.norm(X[:, :3, 3] - np.median(X[:, :3, 3], axis=0), axis=1)
         near = [self.setup.motion.pose(each) for each in X[np.argsort(away, kind="stable")[:FLOW_EXAMPLES]]]
         return next(filter(self._starts, near), near[0])
 
     def _starts(self, pose: Pose) -> bool:
-        """Whether a single run can start at a pose as it is printed."""
+        """Return True if a single run can start at a pose with its printed digits."""
         try:
             (at,) = configurations_at(self.setup, [Pose.parse(str(pose))])
             ServoTask.between(self.setup, at, self.goal)
@@ -339,7 +343,7 @@ class BasinSearch:
         return True
 
     def _abreast(self, X: Array, possible: Flags, seed: int) -> OutcomeCount:
-        """The outcomes of starts X (n, 4, 4) that the batch follows, all abreast."""
+        """Return the outcomes of starts X (n, 4, 4) in a batch."""
         flow, length = self.flow, self.goal.model.length
         assert flow is not None
         starts = np.flatnonzero(possible & flow.batch.reaches(X))
@@ -392,7 +396,8 @@ class BasinSearch:
         return OutcomeCount(outcomes.all, cells, damped, X, len(followed), len(same), sum(same), certified)
 
     def _one_by_one(self, X: Array, grid: Grid) -> OutcomeCount:
-        """The outcomes of the starts of a grid, each simulated; X (n, 4, 4) are its poses, free parts as at home."""
+        """Return the outcomes of the starts of a grid, each simulated; X (n, 4, 4) are its poses, free parts as at the
+        zero configuration."""
         all_samples = self.setup.all_samples
         at = sweep(all_samples.start, all_samples.observation_model, grid, self.setup.motion, self.setup.placer)
         starts = np.array([i for i, each in enumerate(at) if each is not None], dtype=int)
@@ -419,7 +424,7 @@ class BasinSearch:
         return [partial(_simulate, self.task, starts[k : k + FLOW_SINGLE]) for k in range(0, len(starts), FLOW_SINGLE)]
 
     def _run_all(self, works: Sequence[Callable[[], Any]]) -> list[Any]:
-        """What pieces of work give, in their order."""
+        """Return the results of pieces of work, in their order."""
         jobs, found = min(self.jobs, len(works)), []
         for each in run_shared(works, jobs):
             if jobs > 1:
@@ -429,7 +434,7 @@ class BasinSearch:
 
 
 def hindrances(setup: ObservedRobot) -> tuple[str, ...]:
-    """Why runs of a robot cannot be integrated abreast."""
+    """Return the reasons why runs of a robot cannot be batched."""
     own = set(map(id, setup.segments))
     kinds = dict.fromkeys("" if each.by_segment else each.kind for each in setup.observed if id(each) not in own)
     found = [
@@ -448,7 +453,7 @@ def place_of(motion: PlatformMotion, X: Array, names: Sequence[str]) -> Array:
 
 
 def _at(outcome: Outcome, X: Array, length: float) -> Outcome:
-    """The outcome of runs abreast that end at X (4, 4), of which one was simulated on from there."""
+    """Return the outcome of batched runs that end at X (4, 4), of which one was continued from there."""
     if outcome.X is not None and pose_difference(outcome.X, X, length) <= RUNS_ALIKE:
         return outcome
     return Outcome(RunOutcome(UNDECIDED, "a single run does not stay where these end"))
