@@ -174,20 +174,38 @@ class Batch(Value):
         slides: ArrayLike | None = None,
         compiled: Compiled | None = None,
     ) -> Evaluation:
-        """Everything at platform poses X (n, 4, 4) with ``legs`` watched (default: all), ``cones`` their half-angles
-        (rad; one, or one per leg). ``slides`` (n, m) are the coordinates of the P joints :attr:`slides` (m), by which
-        links of the platform slide on it: then the legs on these can be watched as well, and Mᵀ has one more column for
-        each (default: only what the pose alone determines).
+        """Evaluate the batch at platform poses.
 
-        X are poses that the platform can take as far as its own freedoms go; that is not checked. A pose that is not
-        finite is not reached. ``compiled`` asks for numba, or forbids it (default: if its kernels are already compiled
-        and worth starting); "jax" asks for jax, on the device that it has. Raises ``BadRequest`` for legs that are not
-        compiled, poses of another shape, half-angles of cones that are not between 0 and a right angle, and results
-        that are too large.
+        Parameters
+        ----------
+        X
+            Poses (n, 4, 4) in the base frame (m). They must agree with the platform dof, which is not checked. A pose
+            that is not finite is not reached.
+        legs
+            Observed legs (default: all).
+        cones
+            Half-angles of their cones (rad; one, or one per leg).
+        slides
+            Coordinates (n, m) of the P joints :attr:`slides` (m), by which links slide on the platform: then the legs
+            on these can be observed as well, and Mᵀ has one more column for each.
+        compiled
+            True for numba, False for NumPy, "jax" for jax (default: numba if its kernels are compiled and worth
+            starting).
+
+        Returns
+        -------
+        Evaluation
+            Values at the n poses.
+
+        Raises
+        ------
+        BadRequest
+            A leg that is not compiled, poses of another shape, half-angles not between 0 and a right angle, or a
+            result that is too large.
         """
         X = np.asarray(X, dtype=float)
         if X.ndim != 3 or X.shape[1:] != (4, 4):
-            raise BadRequest("poses of a batch: shape", X.shape, "(n, 4, 4)")
+            raise BadRequest("poses of a batch: wrong shape", X.shape, "(n, 4, 4)")
         s = self._slid(slides, len(X))
         slid = s is not None
         watched = self._watched(legs, slid)
@@ -198,7 +216,8 @@ class Batch(Value):
             raise BadRequest(
                 "the result of a batch takes too much memory (bytes)",
                 need,
-                f"at most {LARGEST_BATCH}; sweep goes through any number of poses in parts",
+                f"at most {LARGEST_BATCH}",
+                remedy="Evaluate the poses in parts with sweep.",
             )
         k, n = len(watched), len(X)
         quick = self.uses_numba(n, watched, half, slid=slid) if compiled is None else compiled
@@ -249,9 +268,10 @@ class Batch(Value):
         s = np.asarray(slides, dtype=float)
         if not self.slides or s.shape != (n, len(self.slides)):
             raise BadRequest(
-                "coordinates of slides of a batch: shape",
+                "coordinates of slides of a batch: wrong shape",
                 s.shape,
-                f"({n}, {len(self.slides)})" if self.slides else "none: nothing slides on the platform",
+                f"({n}, {len(self.slides)})" if self.slides else None,
+                remedy="" if self.slides else "Omit them: nothing slides on the platform.",
             )
         return s
 
@@ -264,11 +284,11 @@ class Batch(Value):
         known = [name for name, leg in self.legs.items() if leg is not None or (slid and name in self.sliding)]
         for name in names:
             if name not in known:
-                raise BadRequest("a leg of the batch", name, known)
+                raise BadRequest("unknown leg of the batch", name, known)
             if names.count(name) > 1:
-                raise BadRequest("a leg is watched twice", name, known)
+                raise BadRequest("leg observed twice", name, remedy="Name each leg once.")
         if not names:
-            raise BadRequest("nothing is observed", "no leg", known)
+            raise BadRequest("nothing is observed: got no leg", expected=known)
         return names
 
     @cached_property
@@ -294,10 +314,8 @@ class Batch(Value):
             raise MissingExtra(f"compiled={by!r}", EXTRAS[by])
         if not self.closed:
             raise BadRequest(
-                "a batch whose platform has other twists at each pose, or legs that are solved by "
-                "iteration, is not compiled",
-                True,
-                "compiled=False",
+                "compiled=True: the legs are solved by iteration, or the platform twists change with the pose",
+                remedy="Use compiled=False.",
             )
 
     def _program(self, watched: Sequence[str], slid: bool = False) -> Program:
@@ -460,10 +478,10 @@ def _half_angles(cones: ArrayLike, k: int) -> Array:
     """Half-angles (k,) of the cones of k legs (rad)."""
     half = np.asarray(cones, dtype=float)
     if half.shape not in ((), (k,)):
-        raise BadRequest("half-angles of cones: how many", half.size, f"one, or {k}")
+        raise BadRequest("number of half-angles of cones", half.size, f"one, or {k}")
     for value in half.ravel():
         if not 0 < value < np.pi / 2:
-            raise BadRequest("half-angle of a cone (rad)", float(value), "more than 0, less than a right angle")
+            raise BadRequest("half-angle of a cone (rad)", float(value), "more than 0 and less than pi/2")
     return np.broadcast_to(half, (k,))
 
 

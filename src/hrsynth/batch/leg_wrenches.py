@@ -48,7 +48,7 @@ class LegForce(Value):
         return np.asarray(found / _size(found))
 
     def level(self, p: Array, R: Array) -> Array:
-        """Return the constant (m; n,): the tip's height or distance, or the reference point's height below the point."""
+        """Return the constant (m; n,): the tip's height or distance, or the reference point's height."""
         force, arm = self.force(p, R)
         height = arm if self.turns else arm + p.T - (0.0 if self.normal is not None else self.place[:, None])
         return np.asarray(np.einsum("in,in->n", force, height))

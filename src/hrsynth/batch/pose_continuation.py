@@ -73,14 +73,13 @@ def dependence(
     there = any(are_dependent(at, goal.error_and_jacobian(at.model, at.q)[1]) for at in _aside(start)[-1:])
     if not (there or stuck):
         return None
-    freedoms = "1 freedom" if motion.dof == 1 else f"{motion.dof} freedoms"
     where = "at zero and at a random configuration" if there else "at zero, to first order,"
     why = (
         "none of them changes this part"
         if len(rows) == 1
         else f"parts of {what} depend on each other" + ": give fewer" * there
     )
-    return f"the platform has {freedoms}, and {where} {why}"
+    return f"the platform has {motion.dof} dof, and {where} {why}"
 
 
 def grid_dependence(start: ClosedConfiguration, motion: PlatformMotion, grid: Grid) -> str | None:

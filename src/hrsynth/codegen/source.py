@@ -59,7 +59,7 @@ class ProvedBounds:
 
     @property
     def error(self) -> float:
-        """The largest of the three."""
+        """Largest of the three."""
         return max(self.joints, self.rotation, self.position)
 
     @property

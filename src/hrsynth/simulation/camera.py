@@ -24,7 +24,7 @@ from .mujoco_model import RADIUS
 from .noise import NoiseSamples
 
 VIEWS = 200
-"""Places around the legs that are tried for a camera."""
+"""Camera positions around the legs that are tried."""
 MARGIN = 0.85
 """Fraction of the image, from its centre, in which all legs must lie."""
 SHORTEST, HALF = 0.05, 0.25
@@ -72,7 +72,7 @@ def edges(ends: Array, radius: float) -> tuple[Array, Array]:
     distance = float(np.linalg.norm(moment))
     if distance <= radius:
         raise BadRequest(
-            "the camera is inside a leg or looks along it, distance from its axis (m)",
+            "the camera is inside a leg or looks along it: distance from its axis (m)",
             distance,
             f"more than its radius {radius:.4g}",
         )

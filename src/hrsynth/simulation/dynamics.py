@@ -1,5 +1,4 @@
-"""The dynamic simulation: the same controller drives a MuJoCo model in MuJoCo (the papers' virtual MuJoCo model, MMT
-5.1.1).
+"""Dynamic simulation: the same controller drives a model of the robot in MuJoCo (MMT 5.1.1).
 
 The directions are read from the simulated bodies, the motors' coordinates from their encoders. At each sample the
 model of the robot takes the motors' coordinates, and the speeds that the law commands are held until the next.
@@ -58,7 +57,7 @@ class DynamicSimulation:
             raise BadRequest(
                 f"{setup.robot.name}: its motors do not determine the platform's motion",
                 str(setup.motion.pose(start.pose(setup.motion.link))),
-                "a robot whose motors do",
+                remedy="Omit --dynamics, or use a robot whose motors do.",
             )
         return cls(setup, start)
 

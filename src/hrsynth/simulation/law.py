@@ -160,7 +160,7 @@ def supposed_planes(
     except ValueError:
         depth = np.nan
     if depth is not None and not (word == "constant" and 0 < depth <= FARTHEST_POSE):
-        raise BadRequest("depth", text, f"{SUPPOSED}, more than 0 and at most {FARTHEST_POSE:g}")
+        raise BadRequest("--depth", text, f"{SUPPOSED} (0 to {FARTHEST_POSE:g})")
     found: list[Array | None] = []
     for seen in observation_model.observations:
         plane = None
@@ -169,9 +169,8 @@ def supposed_planes(
         found.append(plane if plane is None or depth is None else depth_plane(np.array([depth])))
     if not any(plane is not None for plane in found):
         raise BadRequest(
-            "--depth: nothing that is observed needs a depth",
-            text,
-            "none, or --sensor of what is seen in an image: point, image_line, edge …",
+            f"--depth {text}: no observation needs a depth",
+            remedy="Omit it, or add an image feature with --sensor: point, image_line or edge.",
         )
     return tuple(found)
 

@@ -94,7 +94,7 @@ def _cut(mechanism: Mechanism) -> tuple[list[tuple[Joint, str]], list[Joint]]:
     joints = list(mechanism.joints.values())
     for joint in joints:
         if joint.type is JointType.FREE:
-            raise BadMechanism(f"{mechanism.name}: a joint with six freedoms has no MuJoCo model", joint.name)
+            raise BadMechanism(f"{mechanism.name}: a joint with six dof has no MuJoCo model", joint.name)
     weights = [_WEIGHTS[joint.type.value] - (DRIVEN if joint.actuated else 0.0) for joint in joints]
     tree = graphs.spanning_forest(mechanism.links, joints, weights)
     ordered = [(joint, near) for joint, near, _ in graphs.outward(mechanism.base, tree)]

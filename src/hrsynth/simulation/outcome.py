@@ -22,8 +22,8 @@ from ..tolerances import DAMPED, NEAR_MODE, SAME_NEAR_POSE, SAME_RELATION
 from .law import Command, Measures
 from .run import AWAY, EFFORT, LIMIT, LOST, OPEN, POISED, REST, SERVED_AT, UNMEASURED, UNSEEN, Run
 
-GOAL, MODE, ANTIPODAL, MINIMUM, BOUNDARY, TIME = "goal", "mode", "antipodal", "local minimum", "boundary", "time"
-SIGHT, UNDECIDED = "lost from sight", "undecided"
+GOAL, MODE, ANTIPODAL, MINIMUM = "goal", "assembly mode", "antipodal", "local minimum"
+BOUNDARY, SIGHT, TIME, UNDECIDED = "limit reached", "out of view", "time", "undecided"
 ENDINGS = (GOAL, MODE, ANTIPODAL, MINIMUM, BOUNDARY, SIGHT, TIME, UNDECIDED)
 
 
@@ -53,24 +53,24 @@ class OutcomeClassifier(Value):
             return self._serve(run.last, values)
         if run.stopped in (REST, POISED):
             ending = rest(self.setup, run.last, last)
-            loose = "" if run.stopped == REST else "; this rest was not found to attract"
+            loose = "" if run.stopped == REST else "; this equilibrium was not found to be stable"
             return replace(ending, reason=ending.reason + loose + self._near(run.last, last.size))
         if run.stopped == LIMIT:
             return RunOutcome(BOUNDARY, f"joint {run.joint} is at its limit")
         if run.stopped == UNSEEN:
-            return RunOutcome(SIGHT, f"{self._unseen(run.last)}: the loop has nothing to act on")
+            return RunOutcome(SIGHT, f"{self._unseen(run.last)}: the error is undefined")
         if run.stopped == UNMEASURED:
             return RunOutcome(
                 SIGHT,
-                "a point or line comes to the camera's centre, or the camera into a cylinder: what is "
-                "measured has no value there",
+                "a point or line reaches the camera centre, or the camera enters a cylinder: the measured value is "
+                "undefined there",
             )
         if run.stopped == OPEN:
-            return RunOutcome(BOUNDARY, "the loops lose their rank here, and the integrator could not continue")
+            return RunOutcome(BOUNDARY, "the loops lose rank here, and the integrator could not continue")
         if run.stopped == LOST:
-            return RunOutcome(UNDECIDED, "the integrator could not continue, which says nothing about the robot")
+            return RunOutcome(UNDECIDED, "the integrator could not continue: the end of the run is undecided")
         if run.stopped == AWAY:
-            return RunOutcome(BOUNDARY, "the platform runs away, nothing limits its slides")
+            return RunOutcome(BOUNDARY, "the platform runs away: no joint limit stops it")
         over = (
             f"more than {RUN_EVALUATIONS:,} configurations would be needed"
             if run.stopped == EFFORT
@@ -82,8 +82,7 @@ class OutcomeClassifier(Value):
             goal = self.same_pose(there, self.goal.pose(self.setup.motion.link))
             pose = "the goal" if goal else str(self.setup.motion.pose(there.pose(self.setup.motion.link)))
             way = (
-                f"; it was still on its way to a rest that attracts, found at {pose}, where the distance left falls "
-                f"by a factor of e every {slow:.3g} s"
+                f"; it was still approaching a stable equilibrium, found at {pose}, with the time constant {slow:.3g} s"
             )
         return RunOutcome(TIME, f"{over}, with ‖e‖ = {last.size:.3g}{way}")
 
@@ -96,7 +95,7 @@ class OutcomeClassifier(Value):
             return ""
         return next(
             (
-                f"; it is near mode {k} of the goal: what is measured differs {mode.differs}"
+                f"; it is near mode {k} of the goal: the measured values differ {mode.differs}"
                 for k, mode in enumerate(() if listed is None else listed.near_modes, 1)
                 if mode.bodies
                 and all(
@@ -111,7 +110,7 @@ class OutcomeClassifier(Value):
         """Return a text on the observation that leaves its camera's field of view."""
         reference = self.setup.mechanism.reference
         first = min(self.setup.observed, key=lambda o: o.in_front(at.pose(o.seen_from or reference), at.pose(o.link)))
-        return f"{first.kind} {first.leg} leaves the camera's sight"
+        return f"{first.kind} {first.leg} leaves the field of view"
 
     def _serve(self, at: ClosedConfiguration, values: Measures) -> RunOutcome:
         opposite = [
@@ -124,8 +123,8 @@ class OutcomeClassifier(Value):
             there = "; the pose is the goal's" if self.same_pose(at, self.goal.pose(self.setup.motion.link)) else ""
             return RunOutcome(
                 ANTIPODAL,
-                f"{sum(opposite)} of {len(opposite)} directions end opposite to the desired "
-                f"ones, where the error vanishes as well{there}",
+                f"{sum(opposite)} of {len(opposite)} directions are opposite to the desired ones, where the error "
+                f"vanishes as well{there}",
             )
         if self.same_pose(at, self.goal.pose(self.setup.motion.link)):
             return RunOutcome(GOAL, f"the {word} and the pose are those of the goal")
@@ -133,7 +132,7 @@ class OutcomeClassifier(Value):
             motion = self.setup.motion
             listed = modes(self.setup, at=motion.pose(self.goal.pose(motion.link)))
         except HrsynthError as error:
-            return RunOutcome(MODE, f"the {word} are the goal's, the pose is not; modes not listed: {error}")
+            return RunOutcome(MODE, f"the {word} are the goal's, the pose is not; assembly modes not listed: {error}")
         for number, mode in enumerate(listed.modes, 1):
             bodies = mode.bodies or {}
             if bodies and all(self._alike(at.pose(body), X, None) for body, X in bodies.items()):
@@ -144,7 +143,7 @@ class OutcomeClassifier(Value):
                     listed,
                 )
         return RunOutcome(
-            MODE, f"the {word} are the goal's, the pose is none of the assembly modes that were listed", None, listed
+            MODE, f"the {word} are the goal's, the pose is none of the listed assembly modes", None, listed
         )
 
     def same_pose(self, at: ClosedConfiguration, X: Array) -> bool:
@@ -164,11 +163,7 @@ def rest(setup: ObservedRobot, at: ClosedConfiguration, last: Command) -> RunOut
     shifted = at.velocity(setup.motion.link) @ last.weak
     if weak and float(np.linalg.norm(shifted)) < DAMPED:
         tree = len(at.model.mechanism.joints) < len(at.model.mechanism.links)
-        why = (
-            "the arm is at a singularity of its own, as where it is stretched"
-            if tree
-            else "a leg that is not watched is stretched to its limit"
-        )
+        why = "the arm is singular, for example stretched" if tree else "an unobserved leg is at the limit of its reach"
         return RunOutcome(BOUNDARY, f"{where}: {why}")
     far = posture.distances
     if weak and far.type2 is not None and far.type2 < DAMPED:
@@ -182,7 +177,7 @@ def rest(setup: ObservedRobot, at: ClosedConfiguration, last: Command) -> RunOut
         )
     off = f"{where} off the singularities of the hidden robot"
     if weak:
-        return RunOutcome(MINIMUM, f"{off}: the law's own rows, with the depths that it supposes, lose rank there")
+        return RunOutcome(MINIMUM, f"{off}: the rows of the law, with the assumed depths, lose rank there")
     if sum(each.rank for each in setup.observed) > len(last.values):
-        return RunOutcome(MINIMUM, f"{off}: more is measured than the robot has freedoms")
+        return RunOutcome(MINIMUM, f"{off}: the observation is redundant")
     return RunOutcome(MINIMUM, off)

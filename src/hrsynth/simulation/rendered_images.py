@@ -38,14 +38,14 @@ def vision() -> Any:
     try:
         import cv2
     except ImportError:
-        raise MissingExtra("finding edges in pictures", "bench") from None
+        raise MissingExtra("finding edges in images", "bench") from None
     return cv2
 
 
 def drawing() -> Any:
     """The module mujoco, ready to draw without a screen; raises ``MissingExtra`` where it is not installed."""
     os.environ.setdefault("MUJOCO_GL", "egl")
-    return simulator("rendering pictures")
+    return simulator("rendering images")
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ from .outcome import RunOutcome
 from .run import Run
 
 ASIDE = 0.9
-"""Part of the root mean square distance that a constant one makes up where noise holds a platform aside."""
+"""Fraction of the root mean square distance that is constant if noise shifts a platform."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +36,9 @@ class Scatter(Record, all_recorded=True):
     rms_metres: Annotated[float, As("rms_position_mm", scale=MM)]
     rms_radians: Annotated[float, As("rms_orientation_deg", scale=DEG)]
     mean: tuple[float, float, float]
-    """Where the platform was on average."""
+    """Mean position of the platform (m)."""
     offset: Annotated[float, As("offset_mm", scale=MM)]
-    """How far that is from the pose at which it settled (m): where noise does not average out."""
+    """Distance of that from the pose at which it settled (m): noise that does not average out."""
 
     @property
     def aside(self) -> bool:
@@ -67,14 +67,14 @@ class Servo(Result, shown_as="servo"):
     depth: Recorded[str]
     settled: ClosedConfiguration
     target: ClosedConfiguration
-    """The goal's configuration."""
+    """Configuration of the goal."""
     spread: Recorded[Scatter | None] = None
     notes: Recorded[tuple[str, ...]] = ()
     """Notes on what the dynamic simulation and noise changed."""
 
     def headline(self) -> str:
-        """The robot and where the run ended."""
-        return f"{self.setup.headline()}: ended at {self.pose}, {self.outcome}"
+        """Return the robot, the outcome and the final pose."""
+        return f"{self.setup.headline()}: {self.outcome} at {self.pose}"
 
     @property
     def outcome(self) -> str:
@@ -84,24 +84,24 @@ class Servo(Result, shown_as="servo"):
     @property
     @recorded()
     def pose(self) -> Pose:
-        """The pose at which it ended."""
+        """Final pose."""
         return self.pose_of(self.settled)
 
-    coordinates = Shown(FileCoordinates, lambda self: FileCoordinates.of(self.settled), "where it ended")
+    coordinates = Shown(FileCoordinates, lambda self: FileCoordinates.of(self.settled), "at the end")
 
     def pose_of(self, at: ClosedConfiguration) -> Pose:
-        """The platform's pose at a configuration."""
+        """Return the platform's pose at a configuration."""
         motion = self.setup.motion
         return motion.pose(at.pose(motion.link))
 
     @property
     def errors(self) -> Array:
-        """‖e_i‖ of the true errors, (n, k)."""
+        """Norms ‖e_i‖ of the true errors, (n, k)."""
         return np.array([[np.linalg.norm(e) for e in command.error] for command in self.run.commands])
 
     @property
     def way(self) -> Array:
-        """The platform's position, that of its point, along the run, (n, 3)."""
+        """Position of the platform's point along the run (m), (n, 3)."""
         motion = self.setup.motion
         return np.array([motion.position(at.pose(motion.link)) for at in self.run.configurations])
 
@@ -112,7 +112,7 @@ class Servo(Result, shown_as="servo"):
 
     @property
     def goal_position(self) -> Array:
-        """The position of the platform's point at the goal, (3,)."""
+        """Position of the platform's point at the goal (m), (3,)."""
         motion = self.setup.motion
         return motion.position(self.target.pose(motion.link))
 
@@ -132,6 +132,6 @@ class Servo(Result, shown_as="servo"):
     modes = Shown(list[AssemblyMode] | None, lambda self: self.run_outcome.modes and self.run_outcome.modes.modes)
     type2 = Shown(TrackRecord, lambda self: self.track.timed(self.run.times))
     limits_ignored = Shown(list[str], lambda self: self.setup.limits_ignored, UNLIMITED)
-    times = Shown(list[float], lambda self: self.run.times, "when (s)")
-    error = Shown(list[list[float]], lambda self: self.errors, "the error of each direction at each time")
+    times = Shown(list[float], lambda self: self.run.times, "times (s)")
+    error = Shown(list[list[float]], lambda self: self.errors, "error of each observation at each time")
     poses = Shown(list[Pose], lambda self: [self.pose_of(at) for at in self.run.configurations])

@@ -58,13 +58,13 @@ class CertifiedRadius(Value):
 
     @property
     def verdict(self) -> str:
-        """Certified, or undecided."""
+        """Return certified, or undecided."""
         return CERTIFIED if self.length > 0 else UNDECIDED
 
     @property
     @recorded()
     def words(self) -> str:
-        """From where every start ends at the goal."""
+        """Starts from which every run ends at the goal, in words."""
         if not self.length:
             return f"undecided: {self.reason}"
         return f"from anywhere {self._within(self.length, self.angle)}"
@@ -72,7 +72,7 @@ class CertifiedRadius(Value):
     @property
     @recorded(As("undamped"))
     def undamped_words(self) -> str | None:
-        """From where, as long as the law is not damped; None where that is not farther."""
+        """Starts from which every run ends at the goal while the law is not damped; null if these are no more."""
         length = self.goal.model.length * self.undamped
         if length <= self.length:
             return None
@@ -104,12 +104,12 @@ def certified_radius(setup: ObservedRobot, goal: ClosedConfiguration) -> Certifi
     """Return the largest attraction radius proved with the budget of boxes, for observed directions of segments."""
     try:
         if not all(each.by_segment for each in setup.observed):
-            raise NotEnclosed("it is for directions of segments only")
+            raise NotEnclosed("only directions of segments are supported")
         error = PoseError.of(setup, goal)
         if error.fitted:
             raise NotEnclosed(f"forms are fitted to samples: {', '.join(error.fitted)}")
         if error.limits:
-            raise NotEnclosed(f"a run may stop at the limits of joints: {', '.join(error.limits)}")
+            raise NotEnclosed(f"a run may stop at a joint limit: {', '.join(error.limits)}")
         proved = _proved_cones(error)
     except NotEnclosed as why:
         return CertifiedRadius(goal, setup.motion, 0.0, None, 0.0, 0.0, 0, str(why))
@@ -144,13 +144,13 @@ def _product(radius: float) -> float:
 
 
 def _proved_cones(error: PoseError) -> ProvedCones:
-    """Cones proved up to nearly where E is seen to stop rising on some ray; raises ``NotEnclosed``."""
+    """Prove cones nearly up to where E stops rising on some ray; raises ``NotEnclosed``."""
     n = error.size
     _, rates = error.numbers(np.zeros((1, n)), np.eye(n))
     J = rates[0]
     values, V = np.linalg.eigh(J.T @ J)
     if values[0] <= RANK_CUTOFF * values[-1]:
-        raise NotEnclosed("the directions do not see all freedoms at the goal")
+        raise NotEnclosed("the directions do not determine all platform twists at the goal")
     W = V / np.sqrt(values)
     seen = _highest(error, W)
     prover = ConeProver.of(error, W * np.sqrt(2 * seen))

@@ -58,12 +58,12 @@ from .outcomes import Outcome, OutcomeCount, Outcomes
 SIDE, SIDE_ONE_BY_ONE = 100, 15
 """Starts along each side of a plane: batched, and simulated separately."""
 REGION, REGION_SIDE = 1.1, (0, 401, 81, 25)
-"""Half the width over which what is certified is drawn, in its radii, and the poses along each side, by the number of
-parts that vary."""
+"""Half the width over which the proved attraction radius is drawn, in radii, and the poses along each side, by the
+number of parts that vary."""
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 """Letters of the outcomes in text and figure."""
 NOT_REACHED = -1
-"""The number of a start at which the robot cannot be."""
+"""Index of a start at which the robot cannot be."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -84,9 +84,8 @@ class BasinEnd(Value):
 
 
 class CertifiedPart(NamedTuple):
-    """The distance from the goal within which every start in its working mode is proved to end there, and what share of
-    the goal's basin among the starts that covers; the larger distance that holds as long as the law is not damped, if
-    there is one."""
+    """Proved attraction radius: every start in the goal's working mode within this distance is proved to end at the
+    goal; the fraction of the goal's basin that it covers; the larger radius while the law is not damped, if any."""
 
     radius: Annotated[CertifiedRadius, FLAT]
     covered: float
@@ -107,25 +106,25 @@ class Basins(Result, shown_as="basins"):
     target: ClosedConfiguration
     grid: Grid
     ends: Recorded[tuple[BasinEnd, ...]]
-    cells: Annotated[Places, Table, "numbers of ``ends``, counted from 0, -1 where no run starts"]
+    cells: Annotated[Places, Table, "indices of ``ends``, from 0; -1 where no run starts"]
     damped: Flags
     batched: Recorded[bool]
     followed: Recorded[int] = 0
     checked: Recorded[int] = 0
     agreed: Recorded[int] = 0
     certified: CertifiedRadius | None = None
-    """From how far around the goal every start is proved to end there."""
+    """Proved attraction radius of the goal."""
 
     @property
     @recorded()
     def starts(self) -> int:
-        """At how many poses of the grid the robot can start."""
+        """Number of poses of the grid at which the robot can start."""
         return int(np.sum(self.cells != NOT_REACHED))
 
     @cached_property
     def region(self) -> tuple[Grid, Flags] | None:
-        """Poses of the drawn set around the goal, and which of them are in what is certified; None where none is, or
-        where that is about another point than the one that the set is drawn of."""
+        """Poses around the goal, and which of them are within the proved attraction radius; None if none is, or if the
+        radius is that of another platform point than the drawn one."""
         found = self.certified
         if found is None or not found.length or found.aside:
             return None
@@ -175,7 +174,7 @@ class Basins(Result, shown_as="basins"):
         )
 
     def headline(self) -> str:
-        """The robot and what share of the starts ends at the goal."""
+        """Return the robot and the share of the starts that ends at the goal."""
         share = next((each.share for each in self.ends if each.run_outcome.name == GOAL), 0.0)
         return f"{self.setup.headline()}: {100 * share:.3g} % of {self.starts:,} starts end at the goal {self.goal}"
 
@@ -186,7 +185,7 @@ class Basins(Result, shown_as="basins"):
     @property
     @recorded(As("certified"))
     def certified_record(self) -> CertifiedPart | None:
-        """Return the proved part; None if no proof was tried."""
+        """Proved part; null if no proof was tried."""
         return None if self.certified is None else CertifiedPart(self.certified, self.covered)
 
 
@@ -203,7 +202,7 @@ def basins(
     camera: CameraLike = None,
     *,
     sensor: SeeLike = None,
-    goal: Annotated[PoseLike, option("Pose whose measurements are desired.", "POSE")],
+    goal: Annotated[PoseLike, option("Pose whose measured values are desired.", "POSE")],
     plane: Annotated[
         PoseLike | None,
         option(
@@ -212,7 +211,7 @@ def basins(
     ] = None,
     grid: Annotated[
         str | None,
-        option("A line, plane or box of starts, such as x=-0.3:0.3:50,y=-0.3:0.3:50,z=-0.7 (from:to:count).", "GRID"),
+        option("Line, plane or box of starts, such as x=-0.3:0.3:50,y=-0.3:0.3:50,z=-0.7 (from:to:count).", "GRID"),
     ] = None,
     steps: Annotated[
         int | None,
@@ -224,28 +223,57 @@ def basins(
     depth: Depth = "exact",
     seed: Seed = 0,
 ) -> Basins:
-    """Where the servo loop to a goal ends, from each start of a line, plane or box of poses.
+    """Basins of attraction: the outcome of the servo loop from each start of a line, plane or box of poses.
 
-    Where the loop ends that servoes what is observed at the pose ``goal``, from each start of a plane of poses (by
-    default one through the goal, as far as it is reached, ``steps`` poses a side) or of a ``grid``, a line, plane or
-    box such as ``x=-0.3:0.3:50,y=-0.3:0.3:50,z=-0.7``.
+    Parameters
+    ----------
+    robot
+        Robot, file or name.
+    observe, camera, sensor
+        Observations, as for ``derive``.
+    goal
+        Pose whose measured values are desired (m, rad, in the base frame).
+    plane
+        Plane of start poses, as far as it is reached, with ``steps`` poses a side (default: one through the goal).
+    grid
+        Line, plane or box of start poses, such as ``x=-0.3:0.3:50,y=-0.3:0.3:50,z=-0.7``.
+    steps
+        Number of poses along each side of the plane.
+    jobs
+        Number of processes, by default one per core; the result does not depend on it.
+    depth
+        Depth of image features that the law assumes, as for ``servo``.
+    seed
+        Seed of samples.
 
-    ``observe``, ``camera`` and ``sensor`` are as for ``derive``. The law is that of ``servo`` with exact measurements
-    (and a ``depth``). Robots whose legs have closed forms and are watched by their directions are integrated together,
-    others one by one. There are ``jobs`` processes, by default one per core; the answer does not depend on their
-    number.
+    Returns
+    -------
+    Basins
+        Outcomes, and the index of the outcome of each start, in the shape of the grid.
 
-    Raises ``BadRequest`` for unknown names, legs that do not see the platform, a singular goal, too many starts;
-    ``PoseNotReached``, ``NoReachablePose`` for poses out of reach.
+    Raises
+    ------
+    BadRequest
+        Unknown name, a platform dof that is not observed, a singular goal, or too many starts.
+    PoseNotReached, NoReachablePose
+        The goal, or all starts are out of reach.
 
+    Notes
+    -----
+    The law is that of ``servo`` with exact measurements. Runs of robots whose legs have closed forms are batched if
+    leg directions are observed; other runs are simulated separately. The proved attraction radius is that of
+    docs/pages/proofs.md, section 14.
+
+    Examples
+    --------
     >>> hrsynth.basins("3rrr_m1", goal="x=0,y=0,phi=0", grid="x=-0.02:0.02:5,y=-0.02:0.02:5,phi=0")
-    <Basins: 3rrr_m1, watching 1, 2, 3: 100 % of 25 starts end at the goal x=0,y=0,z=0,phi=0deg>
+    <Basins: 3rrr_m1, observing 1, 2, 3: 100 % of 25 starts end at the goal x=0,y=0,z=0,phi=0deg>
     """
     setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed)
     asked = asked_pose(goal)
     setup = setup.telling([asked])
     if plane is not None and grid is not None:
-        raise BadRequest("basins: both a plane and a grid are given", str(grid), "one of them")
+        raise BadRequest(f"--grid {grid}: cannot be combined with --plane", remedy="Omit one.")
     (target,) = configurations_at(setup, [asked])
     task = ServoTask.between(setup, target, target, Conditions(depth=depth))
     search = BasinSearch(setup, target, task, jobs or os.cpu_count() or 1)
@@ -254,7 +282,7 @@ def basins(
 
 @dataclass(frozen=True, eq=False)
 class BasinSearch:
-    """A goal and the loop that leads to it, of which many starts are followed, in so many processes (``jobs``)."""
+    """Search of the outcomes of many starts of the loop to a goal, by ``jobs`` processes."""
 
     setup: ObservedRobot
     goal: ClosedConfiguration
@@ -270,7 +298,7 @@ class BasinSearch:
         return Flow(setup.placer, tuple(setup.labels), self.task.directions)
 
     def plane(self, plane: PoseLike | None, steps: int | None) -> Grid:
-        """The poses of a plane that are reached; by default one through the goal."""
+        """Return the reached poses of a plane, by default one through the goal."""
         motion, X = self.setup.motion, self.goal.pose(self.setup.motion.link)
         if plane is not None:
             fixed = as_pose(plane)
@@ -283,16 +311,21 @@ class BasinSearch:
         )
 
     def over(self, grid: Grid, seed: int) -> Basins:
-        """The ends of the runs from all poses of a grid."""
+        """Return the outcomes of the runs from all poses of a grid."""
         name, motion = self.setup.robot.name, self.setup.motion
         most, count = FLOW_STARTS if self.flow else FLOW_STARTS_ONE_BY_ONE, math.prod(grid.shape)
         if count > most:
-            how = "" if self.flow else ", which are simulated one by one"
-            raise BadRequest(f"{name}: number of starts{how}", count, f"at most {most:,}")
+            how = "" if self.flow else ", which are simulated separately"
+            raise BadRequest(
+                f"{name}: number of starts{how}",
+                count,
+                f"at most {most:,}",
+                remedy="Choose fewer --steps or a coarser --grid.",
+            )
         X, possible = poses_over(motion, grid, name, grid.places())
         found = self._abreast(X, possible, seed) if self.flow else self._one_by_one(X, grid)
         if not len(found.outcomes):
-            raise NoReachablePose(name, f"the grid {grid}", f"none of {count} is")
+            raise NoReachablePose(name, f"the grid {grid}", f"{count} were tried")
         counts = np.bincount(found.cells[found.cells != NOT_REACHED], minlength=len(found.outcomes))
         order = sorted(np.flatnonzero(counts), key=lambda i: (ENDINGS.index(found.outcomes[i].ending.name), -counts[i]))
         ends, cells = [], np.full(count, NOT_REACHED)
@@ -391,7 +424,7 @@ class BasinSearch:
         ]
         for run, outcome in zip(followed, told[min(len(away), 1) :], strict=True):
             numbers[run] = outcomes.number(outcome)
-        numbers[numbers < 0] = outcomes.number(Outcome(RunOutcome(UNDECIDED, "not followed to an end")))
+        numbers[numbers < 0] = outcomes.number(Outcome(RunOutcome(UNDECIDED, "not simulated to the end")))
         cells[starts] = numbers
         return OutcomeCount(outcomes.all, cells, damped, X, len(followed), len(same), sum(same), certified)
 
@@ -437,10 +470,7 @@ def hindrances(setup: ObservedRobot) -> tuple[str, ...]:
     """Return the reasons why runs of a robot cannot be batched."""
     own = set(map(id, setup.segments))
     kinds = dict.fromkeys("" if each.by_segment else each.kind for each in setup.observed if id(each) not in own)
-    found = [
-        f"observations of kind {kind} are fed back" if kind else "other links are watched than by default"
-        for kind in kinds
-    ]
+    found = [f"observations of kind {kind}" if kind else "observed links other than the default ones" for kind in kinds]
     if setup.mechanism.stops:
         found.append("a joint has limits")
     return tuple(found) or (("a leg has no closed form",) if setup.placer is None else ())
@@ -456,7 +486,7 @@ def _at(outcome: Outcome, X: Array, length: float) -> Outcome:
     """Return the outcome of batched runs that end at X (4, 4), of which one was continued from there."""
     if outcome.X is not None and pose_difference(outcome.X, X, length) <= RUNS_ALIKE:
         return outcome
-    return Outcome(RunOutcome(UNDECIDED, "a single run does not stay where these end"))
+    return Outcome(RunOutcome(UNDECIDED, "a single run does not stay at the end of these"))
 
 
 def _follow_flow(flow: Flow, horizon: float, farthest: float, X: Array, few: int) -> BatchedRuns:
@@ -470,10 +500,10 @@ def _simulate(task: ServoTask, starts: Sequence[ClosedConfiguration | None]) -> 
     loop, found = task.loop(), []
     for start in starts:
         if start is None:
-            found.append(Outcome(RunOutcome(UNDECIDED, "the robot was not found closed there")))
+            found.append(Outcome(RunOutcome(UNDECIDED, "no closed configuration was found there")))
             continue
         if task.law.in_front(start) < SEEN_ABOVE:
-            found.append(Outcome(RunOutcome(SIGHT, "a camera does not see at the start what it is to see")))
+            found.append(Outcome(RunOutcome(SIGHT, "an observed feature is out of view at the start")))
             continue
         run = loop.simulate(start, task.conditions.horizon)
         ending = classifier.classify(run, measure_all(run.last, task.law.observation_model)[0])

@@ -61,11 +61,11 @@ class CompletenessProof(Value):
     ) -> CompletenessProof:
         """Subdivide the poses of a goal; for all critical points into ``boxes`` at most, if given, by ``jobs``
         processes."""
-        with part("poses without an error"):
+        with part("poses with zero error"):
             found = cover(setup, goal, vanishing=True, budget=boxes or SIGN_BOXES, jobs=jobs)
         if boxes is None:
             return cls(system, setup, found, None)
-        with part("all rests"):
+        with part("all equilibria"):
             return cls(system, setup, found, cover(setup, goal, budget=boxes, jobs=jobs))
 
     def find_missed(

@@ -72,7 +72,7 @@ def equilibria(
     goal: Annotated[
         PoseLike | None,
         option(
-            "The goal: pose whose measurements are desired, such as x=0.02,y=0.1,z=-0.7; or mode:2 "
+            "Pose whose measured values are desired, such as x=0.02,y=0.1,z=-0.7; or mode:2 "
             "(default: the zero configuration).",
             "POSE",
         ),
@@ -80,29 +80,54 @@ def equilibria(
     depth: Depth = "exact",
     complete: Annotated[bool, option("Try to prove that the list is complete, by boxes of platform poses.")] = False,
     max_boxes: Annotated[
-        int, option("Most boxes of poses to look at (10,000 to 40,000 take a second).", "COUNT", low=1)
+        int, option("Largest number of pose boxes (10,000 to 40,000 take a second).", "COUNT", low=1)
     ] = COVER_BOXES,
     jobs: Jobs = None,
     seed: Seed = 0,
 ) -> Equilibria:
-    """Poses at which the servo loop can rest, and which of them attract: the goal, modes, antipodal poses,
-    critical poses of the error.
+    """Equilibria of the servo loop and their stability: the goal, its assembly modes, antipodal poses, and
+    nonzero-error equilibria.
 
-    Poses at which the loop can rest that servoes what is observed at ``goal`` (default: the zero configuration): the
-    goal, modes and antipodal poses, where the error vanishes, and critical poses, where it does not; and which of them
-    attract.
+    Parameters
+    ----------
+    robot
+        Robot, file or name.
+    observe, camera, sensor
+        Observations, as for ``derive``; each kind of observation has its own error.
+    goal
+        Pose whose measured values are desired (m, rad, in the base frame; default: the zero configuration).
+    depth
+        Depth of image features that the law assumes, as for ``servo``. If it assumes one, its command is not a
+        gradient, and equilibria are found, not proved.
+    complete
+        Try to prove that the list is complete, by subdivision of a box of platform poses (seconds to minutes).
+    max_boxes
+        Largest number of boxes of that subdivision.
+    jobs
+        Number of processes, by default one per core; the result does not depend on it.
+    seed
+        Seed of samples and starts.
 
-    ``observe``, ``camera`` and ``sensor`` are as for ``derive``; each kind of observation has its error. The law rests
-    exactly at the critical points of ½ ‖e‖² on the closed loops (proofs.md 11); those at which a camera does not see
-    what it has to see are left out. They are sought from random walks on the branch of the zero configuration.
-    ``complete``: try to prove that they are all, by subdivision of a box of platform poses (seconds to minutes) into
-    ``max_boxes`` boxes at most; where these are many, so many processes share them (``jobs``, by default one per core),
-    on whose number no answer depends. ``depth`` is that of ``servo``; if the law assumes depths, its command is not a
-    gradient, and rests are only found.
+    Returns
+    -------
+    Equilibria
+        Equilibria with their stability, and the proof of completeness, if requested.
 
-    Raises ``BadRequest`` for unknown names, observations that do not see the platform, a singular goal, or one at which
-    something is behind its camera; ``PoseNotReached`` for a pose out of reach.
+    Raises
+    ------
+    BadRequest
+        Unknown name, a platform dof that is not observed, a singular goal, or a feature behind its camera.
+    PoseNotReached
+        The goal is out of reach.
 
+    Notes
+    -----
+    The equilibria of the law are exactly the critical points of ½ ‖e‖² on the closed loops (docs/pages/proofs.md,
+    section 11). Those at which a feature is out of view are left out. They are sought from random walks on the branch
+    of the zero configuration.
+
+    Examples
+    --------
     >>> hrsynth.equilibria("rrrrr_m1", goal="x=0,y=0.25").attracting[0].kind
     'goal'
     """
@@ -116,7 +141,7 @@ def equilibria(
     require_regular(ConfigurationAnalysis.of(setup), "goal", target)
     search = EquilibriumSearch.of(setup, target, depth)
     require_sight(setup, search.law, "goal", target)
-    report("rests")
+    report("equilibria")
     return search.answer(seed, complete=complete, max_boxes=max_boxes, jobs=jobs or os.cpu_count() or 1)
 
 

@@ -50,7 +50,7 @@ class Equilibrium(OfConfiguration, Record):
     """
 
     pose: Recorded[Pose]
-    kind: Annotated[str, Literal["goal", "mode", "antipodal", "critical"]]
+    kind: Annotated[str, Literal["goal", "assembly mode", "antipodal", "critical"]]
     stability: Annotated[str, Stability]
     error: Recorded[float]
     curvatures: Annotated[tuple[float, ...], "eigenvalues of the Hessian of ½ ‖e‖²"]
@@ -59,34 +59,34 @@ class Equilibrium(OfConfiguration, Record):
     turn: Annotated[float, Number, As("radius_rad")] = np.inf
     decided: Recorded[bool] = False
     convergence_rates: Annotated[
-        tuple[tuple[float, float], ...], "intervals of those of the linearised loop, times −1 / gain"
+        tuple[tuple[float, float], ...], "intervals of the linearised loop's eigenvalues, times −1 / gain"
     ] = ()
-    side: Annotated[str | None, Literal["goal", "other"] | None, "of the Type 2 locus"] = None
+    side: Annotated[str | None, Literal["goal", "other"] | None, "side of the Type 2 locus"] = None
     reversed: Recorded[tuple[str, ...]] = ()
     orthogonal_legs: Recorded[tuple[str, ...]] = ()
     singular: Recorded[str | None] = None
     boundary: Recorded[bool] = False
     beyond_limits: Recorded[tuple[str, ...]] = ()
     legs_in_other_mode: Recorded[tuple[str, ...] | None] = None
-    hits: Annotated[int, "how many starts led to it"] = 0
+    hits: Annotated[int, "number of starts that led to it"] = 0
     working_modes: Recorded[int] = 1
 
     @property
     @recorded()
     def proved(self) -> bool:
-        """Return True if it is enclosed."""
+        """True if it is enclosed."""
         return bool(np.isfinite(self.shift))
 
     @property
     @recorded(Literal["yes", "beyond limits"])
     def assembly(self) -> str:
-        """Return ``yes`` if the whole robot can be assembled there, else the reason."""
+        """Assembly of the whole robot there."""
         return BEYOND if self.beyond_limits else ASSEMBLED
 
     @property
     @recorded()
     def stable(self) -> bool | None:
-        """Return True if it is stable; None if that is not decided."""
+        """True if it is stable; null if that is not decided."""
         return None if self.stability == UNDECIDED else self.stability == STABLE
 
     def __repr__(self) -> str:
@@ -108,7 +108,7 @@ class SignedModes(Value):
     @property
     @recorded()
     def complete(self) -> bool:
-        """Return True if the list is proved to be complete."""
+        """True if the list is proved to be complete."""
         return self.boxes is not None or (self.listed is not None and self.listed.found.complete)
 
     @property
@@ -121,7 +121,7 @@ class SignedModes(Value):
     @property
     @recorded()
     def complex(self) -> int | None:
-        """Return the number of such poses, complex ones included; None if unknown."""
+        """Number of such poses, complex ones included; null if unknown."""
         return None if self.listed is None or self.listed.found.continuous_family else self.listed.found.complex
 
 
@@ -173,7 +173,7 @@ class CompletenessReport(Value):
     @property
     @recorded()
     def unstretched(self) -> tuple[str, ...] | None:
-        """Unobserved legs, if equilibria were searched only while none of them is stretched; None if they were searched
+        """Unobserved legs, if equilibria were searched only while none of them is stretched; null if they were searched
         everywhere."""
         return None if self.result.loop is None else tuple(str(each.label) for each in self.result.loop.idle)
 
@@ -186,27 +186,26 @@ class CompletenessReport(Value):
     @property
     @recorded()
     def complete(self) -> bool:
-        """Return True if the list and ``only_proved`` hold all equilibria in the box."""
+        """True if the list and ``only_proved`` hold all equilibria in the box."""
         return self.result.complete and not self.only_found
 
     @property
     def reason(self) -> str:
-        """Why it does not, as far as known."""
+        """Reason for incompleteness, if known; else empty."""
         cover = self.result
         if cover.reason:
             return cover.reason
         if cover.open:
-            more = f"; {cover.boxes:,} were looked at, more with --max-boxes" if cover.spent else ""
-            return f"{len(cover.open):,} boxes, {cover.share:.2g} of all, are left open{self._where()}{more}"
+            more = f"; {cover.boxes:,} were processed; increase --max-boxes" if cover.spent else ""
+            return f"{len(cover.open):,} boxes, {cover.share:.2g} of all, are undecided{self._where()}{more}"
         if self.only_found:
-            return f"{self.only_found} of the list are not among those that boxes prove"
+            return f"{self.only_found} of the list are not among those proved by boxes"
         return ""
 
     @property
     @recorded()
     def locked(self) -> tuple[LockedRegion, ...]:
-        """The points (m) near which legs may lock each other, and the distance from them within which nothing was
-        searched."""
+        """Points (m) near which legs may lock each other, with the distance within which nothing was searched."""
         error = self.result.error
         if error is None:
             return ()
@@ -224,7 +223,7 @@ class CompletenessReport(Value):
         k = cover.error.shifts.shape[1]
         corners = np.array(cover.open)[:, :, :k]
         if not np.isfinite(corners).all():
-            return ", some however far away"
+            return ", some arbitrarily far away"
         places = [np.array(each) for each in join_boxes(corners)] if len(corners) <= MOST_JOINED else []
         if not 0 < len(places) <= PLACES_TOLD:
             places = [np.stack([corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)])]
@@ -265,7 +264,7 @@ class Equilibria(Result, shown_as="equilibria"):
     pose: Annotated[Pose, As("at")]
     desired: Measures
     points: tuple[Equilibrium, ...]
-    families: Annotated[tuple[Equilibrium, ...], "one from each family that fills a curve or surface"]
+    families: Annotated[tuple[Equilibrium, ...], "one equilibrium of each continuous family"]
     lists: Annotated[tuple[SignedModes, ...], As("signs")]
     measured: Recorded[tuple[str, ...]]
     search: CriticalPoints
@@ -275,8 +274,8 @@ class Equilibria(Result, shown_as="equilibria"):
     @property
     @recorded()
     def complete(self) -> bool:
-        """Return True if these, and those in ``subdivision.only_proved``, are proved to be all: in all working modes of
-        the observed legs, within the searched box."""
+        """True if these, and those in ``subdivision.only_proved``, are proved to be all: in all working modes of the
+        observed legs, within the searched box."""
         return self.subdivision is not None and self.subdivision.complete
 
     @property
@@ -306,8 +305,8 @@ class Equilibria(Result, shown_as="equilibria"):
     def headline(self) -> str:
         """Return the robot and the number of equilibria."""
         return (
-            f"{self.setup.headline()}: {len(self.points)} poses at which the loop to {self.pose} can rest, "
-            f"{len(self.stable)} of them attract"
+            f"{self.setup.headline()}: {len(self.points)} equilibria of the loop to {self.pose}, "
+            f"{len(self.stable)} of them stable"
         )
 
     complex = Shown(int | None, lambda self: self.lists[0].complex)

@@ -48,7 +48,7 @@ class SubdivisionResult(Value):
 
     found: tuple[CriticalBox, ...]
     open: tuple[tuple[Array, Array], ...]
-    share: Annotated[float, "of the open boxes"]
+    share: Annotated[float, "of the undecided boxes"]
     boxes: Recorded[int]
     bounded: bool
     reason: str = ""
@@ -228,7 +228,7 @@ def _families(
     _read(error)
     if error.turns.shape[1] > 1:
         if vanishing:
-            raise NotEnclosed("the platform turns about more than one axis")
+            raise NotEnclosed("the platform rotates about more than one axis")
         return error, [SpringError.about(error)], None
     struts = Struts.of(setup, goal, error)
     if struts is not None:

@@ -68,10 +68,10 @@ class LoopError(JointError):
             or len(set(joints)) != 2
             or not all(isinstance(error.limbs[i], OnCrank | OnRail) for i in joints)
         ):
-            raise NotEnclosed("not two rods of constant length are watched")
+            raise NotEnclosed("the observed legs are not two rods of constant length")
         found = cls(error, joints, error, shortest=0.0)
         if error.turns.shape[1] > 1 or any(abs(each.size) < EXACT for each in found.terms):
-            raise NotEnclosed("the watched legs do not tell how the platform turns")
+            raise NotEnclosed("the observed legs do not determine the platform's rotation")
         if error.shifts.shape[1] == 2:
             normal = np.cross(*error.shifts.T)
             off = [
@@ -82,7 +82,7 @@ class LoopError(JointError):
                 ),
             ]
         if error.shifts.shape[1] not in (2, 3) or (error.shifts.shape[1] == 2 and np.abs(off).max() > FOLLOWED):
-            raise NotEnclosed("the legs move neither in a plane nor in space")
+            raise NotEnclosed("the motion is neither planar nor spatial")
         return found
 
     @cached_property

@@ -64,7 +64,7 @@ class PlaneError(JointError):
             setup.samples.observation_model,
         )
         motion = PlatformMotion.of(configurations, replace(observation_model, observations=()))
-        depends = NotEnclosed("the parts of the platform's pose that change depend on each other")
+        depends = NotEnclosed("the variable parts of the platform's pose depend on each other")
         legs = setup.decomposition.legs
         normals = [_normal(setup.mechanism, leg) for leg in legs]
         if not motion.body or motion.twists.shape[1] < 6 or any(normal is None for normal in normals):
@@ -281,7 +281,7 @@ def factors(span: Array, forms: Sequence[Array]) -> Iterator[tuple[Array, list[A
     elif values[large].min() < 0 < values[large].max():
         yield from ((own, [first, *left]) for own, left in factors(span, rest))
     elif not large.all():
-        raise NotEnclosed("poses at which planes of legs touch each other")
+        raise NotEnclosed("planes of legs are tangent to each other at some poses")
 
 
 def _normal(mechanism: Mechanism, leg: Leg) -> Array | None:

@@ -142,7 +142,7 @@ class PoseError(Value):
         """Build the error of the observations about a configuration; raises ``NotEnclosed``."""
         require_directions(setup)
         configurations = [setup.all_samples.start, *setup.configurations]
-        reason = "the parts of the platform's pose that change depend on each other"
+        reason = "the variable parts of the platform's pose depend on each other"
         for each in path_coordinates(setup.decomposition, setup.samples.observation_model, setup.dof, configurations):
             try:
                 return cls.along(setup, goal, each)
@@ -292,13 +292,13 @@ class PoseError(Value):
 
 
 def require_directions(setup: ObservedRobot) -> None:
-    """Raises ``NotEnclosed`` where something else is measured than directions, seen from the base."""
+    """Raise ``NotEnclosed`` unless directions are measured from the base."""
     mechanism = setup.mechanism
     others = [each for each in setup.observed if not isinstance(each, Direction)]
     if others:
-        raise NotEnclosed(f"of leg {others[0].leg} something other than a direction is measured")
+        raise NotEnclosed(f"the observation of leg {others[0].leg} is not a direction")
     if mechanism.reference != mechanism.base or any(each.seen_from is not None for each in setup.observed):
-        raise NotEnclosed("directions are not seen from the base")
+        raise NotEnclosed("directions are not measured from the base")
     if mechanism.couplings:
         raise NotEnclosed("joints are coupled")
 
@@ -327,8 +327,8 @@ def _seen_direction(
     if rule is not None and not rule.follows:
         # what does not turn with the platform is the same everywhere
         if known.coordinates.turning and np.any(rule.turned) and np.any(rule.constant):
-            raise NotEnclosed(f"the direction of link {observation.link} turns in part with the platform")
+            raise NotEnclosed(f"the direction of link {observation.link} rotates partly with the platform")
         return ObservedDirection(observation.leg, 1.0, None, rule)
     raise NotEnclosed(
-        f"the direction of link {observation.link} of leg {observation.leg} is not that of a rod whose form is known"
+        f"the direction of link {observation.link} of leg {observation.leg} is not that of a rod in closed form"
     )

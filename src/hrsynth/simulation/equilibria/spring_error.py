@@ -125,10 +125,12 @@ class SpringError(JointError):
             or len(limbs) != 3
             or not all(isinstance(each, SlidingRod) and each.aside == 0 and each.axis is None for each in limbs)
         ):
-            raise NotEnclosed("the platform turns about more than one axis, and not three rods that slide are watched")
+            raise NotEnclosed(
+                "the platform rotates about more than one axis, and the observed legs are not three sliding rods"
+            )
         found = cls(error, (), error, shortest=0.0)
         if abs(np.linalg.det(found.desired)) < SAME_ENDING or found.sizes[3] < SAME_ENDING:
-            raise NotEnclosed("the watched legs do not tell the platform's plane")
+            raise NotEnclosed("the observed legs do not determine the platform's plane")
         return found
 
     @property

@@ -133,7 +133,7 @@ class Subdivision:
 
         def say(looked: int, waiting: int, share: float) -> None:
             report(
-                f"{stage}: {np.floor(100 * (1 - share)):.0f} % of the space settled, {looked:,} looked at of at most "
+                f"{stage}: {np.floor(100 * (1 - share)):.0f} % of the space settled, {looked:,} processed of at most "
                 f"{budget:,}, {waiting:,} waiting"
             )
 
