@@ -108,7 +108,7 @@ class SignedModes(Value):
     @property
     @recorded()
     def complete(self) -> bool:
-        """True if the list is proved to be complete."""
+        """True if the list is proved to be all."""
         return self.boxes is not None or (self.listed is not None and self.listed.found.complete)
 
     @property
