@@ -314,7 +314,7 @@ class Batch(Value):
             raise MissingExtra(f"compiled={by!r}", EXTRAS[by])
         if not self.closed:
             raise BadRequest(
-                "compiled=True: the legs are solved by iteration, or the platform twists change with the pose",
+                "a batch with iterated legs, or with platform twists that change with the pose, is not compiled",
                 remedy="Use compiled=False.",
             )
 

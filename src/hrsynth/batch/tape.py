@@ -119,7 +119,7 @@ class Tape:
     known: dict[tuple[Any, ...], Symbol] = field(default_factory=dict)
 
     def make(self, name: str, *arguments: Any) -> Symbol:
-        """An operation on symbols and constants, found again where it is there already."""
+        """Return an operation on symbols and constants; equal ones are shared."""
         operation = (name, *(each.number if isinstance(each, Symbol) else float(each) for each in arguments))
         return self._find(operation)
 

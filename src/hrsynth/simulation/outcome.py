@@ -81,9 +81,7 @@ class OutcomeClassifier(Value):
             there, slow = run.ahead
             goal = self.same_pose(there, self.goal.pose(self.setup.motion.link))
             pose = "the goal" if goal else str(self.setup.motion.pose(there.pose(self.setup.motion.link)))
-            way = (
-                f"; it was still approaching a stable equilibrium, found at {pose}, with the time constant {slow:.3g} s"
-            )
+            way = f"; it was still approaching a stable equilibrium at {pose}, with the time constant {slow:.3g} s"
         return RunOutcome(TIME, f"{over}, with ‖e‖ = {last.size:.3g}{way}")
 
     def _near(self, at: ClosedConfiguration, size: float) -> str:

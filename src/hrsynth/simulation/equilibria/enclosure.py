@@ -226,7 +226,7 @@ def _free(system: ErrorSystem, q: Array, idle: int) -> Array:
 
 
 def idle_motions(system: ErrorSystem, q: Array, idle: int) -> Array:
-    """Return motions of the loops (c, N, idle) at configurations (c, N) with the flattest E: the internal ones."""
+    """Return motions of the loops (c, N, k) at configurations (c, N) with the flattest E: the internal ones."""
     at = CriticalPointEquations(system, list(q.T))
     tangents = Tangents.of(at.DG)
     Z = tangents.Z

@@ -181,7 +181,7 @@ def cover(
         ]
     left, lost = (
         [corners for part in every for corners in _corners(part.error, boxes(part), error.size)]
-        for boxes in (lambda part: part.left, lambda part: part.unobserved)
+        for boxes in (lambda part: part.left, lambda part: part.lost)
     )
     locked, left = _places(join_boxes(lost), left, (high - low)[: error.size])
     meeting = [
