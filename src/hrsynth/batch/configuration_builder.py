@@ -1,4 +1,4 @@
-"""From platform poses to closed configurations: the poses of all links by leg, then the joints' coordinates.
+"""Closed configurations at platform poses: the poses of all links by leg, then the joints' coordinates.
 
 Each leg's links start from the solution of its subproblem and are closed by a few Gauss-Newton steps, all poses at
 once; a result counts only if Pinocchio's own loops are closed.

@@ -1,4 +1,4 @@
-"""From Mᵀ to the largest errors of position and orientation (docs/pages/proofs.md, section 10)."""
+"""Largest errors of position and orientation from Mᵀ (docs/pages/proofs.md, section 10)."""
 
 from __future__ import annotations
 

@@ -110,7 +110,7 @@ class ClosureRows(Value):
         )
 
     def rates(self, X: Array) -> Array:
-        """Its derivatives by the twists of all links, (n, rows, links, 6)."""
+        """Return the derivatives by the twists of all links, (n, rows, links, 6)."""
         (i, j, normal, _, at_j), (k, m, alpha, beta, _) = self._stacked
         R, o = X[..., :3, :3], X[..., :3, 3]
         J = np.zeros((len(X), self.count, X.shape[1], 6))

@@ -41,7 +41,7 @@ class PlatformLink(Value):
         return PlatformPoint(True, b, c)
 
     def poses(self, p: Array, R: Array) -> Array:
-        """Its poses (n, 4, 4) at poses (n, 3), (n, 3, 3) of the platform."""
+        """Return the link's poses (n, 4, 4) at poses (n, 3), (n, 3, 3) of the platform."""
         X = np.tile(np.eye(4), (len(p), 1, 1))
         X[:, :3, 3] = p + R @ self.b + self.c
         X[:, :3, :3] = R @ self.Q if self.turns else self.Q

@@ -31,9 +31,9 @@ from .tape import LANES, Store, Symbol, Tape
 CHUNK = 4096
 """Poses that are worked on together, so that their arrays stay in the cache."""
 Compiled = bool | Literal["numba", "jax"]
-"""By what a program is compiled: True is numba, False nothing."""
+"""Compiler of a program: True is numba, False nothing."""
 Formula = Callable[..., Mapping[str, Components]]
-"""From the components of what it reads to those of what it makes, by name."""
+"""Function from the components of its inputs to those of its outputs, by name."""
 
 
 @dataclass(eq=False)
@@ -44,7 +44,7 @@ class Program:
     places: dict[str, list[Any]]
     count: int
     section: Section = field(default_factory=lambda: Section(None))
-    """Where formulas are added."""
+    """Section to which formulas are added."""
     sections: list[Section] = field(default_factory=list)
     numbers: list[float] = field(default_factory=list)
     tape: Tape | None = None

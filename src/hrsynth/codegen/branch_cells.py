@@ -119,7 +119,7 @@ class TubedBranch(Value):
         return self.system.mechanism.length if self.system.coordinates[i].slides else 1.0
 
     def unit_name(self, i: int) -> str:
-        """Its unit's name."""
+        """Return the name of its unit."""
         return "m" if self.system.coordinates[i].slides else "rad"
 
     @property
@@ -142,7 +142,7 @@ class TubedBranch(Value):
 
 
 def _reasons(part: BranchPart) -> str:
-    """Why nothing of a part is proved: each reason once, with the place that is nearest to zero."""
+    """Return the reasons for which nothing of a part is proved: each once, with the place nearest to zero."""
     nearest: dict[str, Array] = {}
     for each in sorted(part.toggles, key=lambda each: float(np.linalg.norm(each.q))):
         nearest.setdefault(each.reason, each.q)

@@ -180,7 +180,7 @@ class _Code:
     closure: TracedFunction
     rows: list[int]
     closed: Array
-    """What the solved equations may be off where their loops count as closed."""
+    """Residuals of the solved equations below which their loops count as closed."""
 
     @property
     def solved(self) -> Sequence[LoopEquation]:

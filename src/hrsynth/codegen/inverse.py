@@ -44,7 +44,7 @@ class LegMotor(Value):
     point: Array
     """The platform's reference point in its own frame: the form takes its place and the rotation."""
     zero: Any
-    """What is read at the zero configuration."""
+    """Value at the zero configuration."""
 
     def read(self, position: Components, R: Components) -> tuple[Any, Any]:
         """Return the reach margin, and the vector or length that determines the coordinate, at a pose of the platform's

@@ -30,13 +30,13 @@ class SourcePart(Value):
     rows: tuple[int, ...]
     """The places of G among E."""
     count: int
-    """How many equations there are in all."""
+    """Number of equations in all."""
     closed: tuple[float, ...]
-    """What each of them may be off in an answer."""
+    """Tolerance of each of them in a result."""
     root: int
     nodes: tuple[Node, ...]
     depth: int
-    """Of the tree."""
+    """Root of the tree."""
     cells: tuple[tuple[tuple[float, ...], ...], ...]
     """Centre, x there, slopes row by row, radius."""
     units: tuple[float, ...]
@@ -88,7 +88,7 @@ class Source(Value):
     legs: tuple[LegMotor, ...]
     """Closed forms of the motors of a pose; none where Newton's method finds them."""
     bounds: ProvedBounds | None
-    """What is proved of its steps and answers; None where some cell has no bound."""
+    """Proved bounds of its steps and results; None if some cell has no bound."""
 
     @classmethod
     def of(cls, branch: TubedBranch, observed: Sequence[Direction], legs: Sequence[LegMotor] = ()) -> Source:

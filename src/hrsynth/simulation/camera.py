@@ -1,4 +1,4 @@
-"""A pinhole camera that sees legs as cylinders: their edges, and the directions rebuilt from them (MMT 2.1-2.2).
+"""Pinhole camera that images legs as cylinders: their edges, and the directions computed from them (MMT 2.1-2.2).
 
 In the camera's frame x points right, y down and z ahead. An axis through P with direction u has the unit normal h of
 its interpretation plane and the distance h from the camera: h h = P × u.
@@ -33,7 +33,7 @@ SHORTEST, HALF = 0.05, 0.25
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Cylinder(Value):
-    """The cylinder of an observed direction: ends in its link's frame (2, 3), the second ahead along it, radius (m)."""
+    """Cylinder of an observed direction: ends in its link's frame (2, 3), the second ahead along it, radius (m)."""
 
     link: str
     ends: Array
@@ -51,7 +51,7 @@ class Camera(Value):
     height: int = 480
 
     def project(self, X_reference: Array, poses: Poses, rod: Cylinder) -> Array:
-        """The ends of a rod in the camera's frame, (2, 3)."""
+        """Return the ends of a rod in the camera's frame, (2, 3)."""
         X = inverse(X_reference @ self.place) @ poses(rod.link)
         return np.asarray(rod.ends @ X[:3, :3].T + X[:3, 3])
 
@@ -65,8 +65,8 @@ class Camera(Value):
 
 
 def edges(ends: Array, radius: float) -> tuple[Array, Array]:
-    """The unit normals (3,) of the two planes through the camera that touch a cylinder whose axis has the ends (2, 3)
-    (eqs. 3-4); raises ``BadRequest`` where the camera is inside of it."""
+    """Return the unit normals (3,) of the two camera planes tangent to a cylinder whose axis has the ends (2, 3)
+    (eqs. 3-4); raises ``BadRequest`` if the camera is inside of it."""
     u = unit(ends[1] - ends[0])
     moment = np.cross(ends[0], u)
     distance = float(np.linalg.norm(moment))
@@ -84,12 +84,12 @@ def edges(ends: Array, radius: float) -> tuple[Array, Array]:
 
 
 def rebuilt(first: Array, second: Array) -> Array:
-    """The direction (3,) of a cylinder from the normals of its two edges (eq. 5); singular where they coincide."""
+    """Return the direction (3,) of a cylinder from the normals of its two edges (eq. 5); singular if they coincide."""
     return unit(np.cross(first, second))
 
 
 def cylinders(mechanism: Mechanism, observations: Sequence[Observation]) -> tuple[Cylinder, ...]:
-    """The rods of observed directions: as long as their joints are apart."""
+    """Return the rods of observed directions, as long as the distance of their joints."""
     found = []
     for observation in observations:
         assert isinstance(observation, Direction)
@@ -116,7 +116,7 @@ class Edges(Value):
     shocks: NoiseSamples
 
     def __call__(self, time: float, poses: Poses, directions: Measures) -> Array:
-        """The measured directions (k, 3) in the reference link's frame."""
+        """Return the measured directions (k, 3) in the reference link's frame."""
         shock = self.shocks.at(time) * self.pixels / self.camera.focal
         found = []
         for number, rod in enumerate(self.rods):
@@ -130,7 +130,7 @@ class Edges(Value):
 
 
 def _move_edge(normal: Array, ends: Array, shift: Array) -> Array:
-    """The normal of an edge whose image is moved across itself by ``shift`` (two numbers) at the rod's ends."""
+    """Return the normal of an edge whose image is moved across itself by ``shift`` (two numbers) at the rod's ends."""
     across = unit(np.array([normal[0], normal[1], 0.0]))
     points = []
     for end, by in zip(ends, shift, strict=False):
@@ -158,7 +158,7 @@ def place_camera(
 
 
 def rods_in_frame(rods: Sequence[Cylinder], reference: str, poses: Poses) -> Array:
-    """The ends of rods (rods, 2, 3) in the frame of the reference link."""
+    """Return the ends of rods (rods, 2, 3) in the frame of the reference link."""
     frames = [inverse(poses(reference)) @ poses(rod.link) for rod in rods]
     return np.array([rod.ends @ X[:3, :3].T + X[:3, 3] for rod, X in zip(rods, frames, strict=True)])
 

@@ -26,7 +26,7 @@ from ..tolerances import DAMPED, INVERTED
 
 TYPE_2, TYPE_1, LIMIT, CONSTRAINT = "type2", "type1", "limit", "constraint"
 LOOPS = 2
-"""The place of the loops among the three maps."""
+"""Index of the loops among the three maps."""
 
 
 @dataclass(frozen=True)
@@ -39,14 +39,14 @@ class RunCrossing:
 
 
 class RunCrossingRecord(NamedTuple):
-    """A singularity or limit that was passed, and when (s)."""
+    """Singularity crossed by the run, and its time (s)."""
 
     kind: str
     time: float
 
 
 class TrackRecord(NamedTuple):
-    """The smallest singular value on the way, when (s) it was met, and what was passed."""
+    """Smallest singular value along the run, its time (s), and the crossings."""
 
     smallest: Number
     at: Number
@@ -62,7 +62,7 @@ class SingularityTrack(Value):
     passages: tuple[RunCrossing, ...] | None
 
     def crossings(self, kind: str) -> tuple[RunCrossing, ...]:
-        """The passages of one kind."""
+        """Return the crossings of one kind."""
         return tuple(each for each in self.passages or () if each.kind == kind)
 
     def timed(self, times: Array) -> TrackRecord:
@@ -89,7 +89,7 @@ class _Mark:
 
     @cached_property
     def least(self) -> Array:
-        """The smallest singular values (3,) of rates, twists and loops (a part of the largest)."""
+        """Smallest singular values (3,) of rates, twists and loops (a part of the largest)."""
         return np.array(
             [*(np.linalg.svd(each, compute_uv=False)[-1] for each in (self.rates, self.twists)), self.weakest]
         )
@@ -100,7 +100,7 @@ class _Mark:
         return bool(np.all(self.least > DAMPED))
 
     def smallest(self, dof: int) -> float:
-        """The smallest singular value of Mᵀ."""
+        """Smallest singular value of Mᵀ."""
         left, values, _ = np.linalg.svd(self.twists, full_matrices=False)
         if len(values) < dof or values[dof - 1] <= INVERTED * values[0]:
             return np.nan
@@ -114,7 +114,7 @@ def track_run(
     moving: ObservationModel,
     dof: int,
 ) -> SingularityTrack:
-    """The track of a run; ``question`` holds what is observed, ``moving`` everything that counts as motion."""
+    """Track the singularities of a run; ``moving`` has all motions that count."""
     marks = [_mark(at, observation_model, moving) for at in configurations]
     smallest = np.array([mark.smallest(dof) for mark in marks])
     if any(mark.basis.shape[1] != dof for mark in marks):
@@ -168,5 +168,5 @@ def _turned_maps(a: _Mark, b: _Mark) -> Array:
 
 
 def _sign(matrix: Array) -> float:
-    """The sign of a determinant, 1 where it is zero."""
+    """Return the sign of a determinant, 1 if it is zero."""
     return float(np.linalg.slogdet(matrix)[0]) or 1.0

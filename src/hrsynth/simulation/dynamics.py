@@ -32,7 +32,7 @@ SAMPLE = 0.01
 
 
 def simulator(what: str) -> Any:
-    """The module mujoco; raises ``MissingExtra`` where it is not installed."""
+    """Return the module mujoco; raises ``MissingExtra`` if it is not installed."""
     try:
         import mujoco
     except ImportError:
@@ -42,7 +42,7 @@ def simulator(what: str) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class DynamicSimulation:
-    """A MuJoCo model that starts at a configuration of a robot."""
+    """MuJoCo model that starts at a configuration of a robot."""
 
     setup: ObservedRobot
     start: ClosedConfiguration
@@ -63,7 +63,7 @@ class DynamicSimulation:
 
     @cached_property
     def mechanism(self) -> Mechanism:
-        """The robot with the start as its zero configuration."""
+        """Robot with the start as its zero configuration."""
         return rezero(self.start)
 
     @cached_property
@@ -121,7 +121,7 @@ class DynamicSimulation:
         return len(commands) > back and abs(now - commands[-1 - back].size) < BENCH_STEADY * now
 
     def _command(self, loop: Loop, time: float, at: ClosedConfiguration, data: Any) -> Command:
-        """The law's command for the directions of the simulated bodies."""
+        """Return the command of the law for the directions of the simulated bodies."""
         observation_model, start = loop.law.observation_model, self.start
         reference = observation_model.reference
 
@@ -154,7 +154,7 @@ def read_encoders(
 
 
 def displacement(data: Any, link: str) -> Array:
-    """The displacement (4, 4) of a simulated body since the start."""
+    """Return the displacement (4, 4) of a simulated body since the start."""
     body = data.body(link)
     X = np.eye(4)
     X[:3, :3] = body.xmat.reshape(3, 3)

@@ -38,7 +38,7 @@ Desired = Callable[[float], tuple[Measures, Measures]]
 Poses = Callable[[str], Array]
 """The pose X_BL (4, 4) of each link."""
 Sense = Callable[[float, Poses, Measures], Measures]
-"""What is measured at a time where the links are at their poses and the true values are given."""
+"""Measured values at a time, given link poses and true values."""
 POSES = 24
 """Poses between start and goal at which the values of a trajectory are taken."""
 SUPPOSED = "exact, desired or constant:METRES"

@@ -22,21 +22,21 @@ from ..mechanism.screws import elementary
 GRAVITY = 9.81
 """m/s²."""
 DENSITY = 1500.0
-"""Of all rods (kg/m³)."""
+"""Density of all rods (kg/m³)."""
 RADIUS = 0.02
-"""Of all rods, in characteristic lengths of the robot."""
+"""Radius of all rods, in characteristic lengths of the robot."""
 STEP = 5e-4
 """Seconds of a step of the simulation."""
 STIFF = {"solref": "0.001 1", "solimp": "0.9999 0.9999 0.001 0.5 2"}
 """Loops that keep closed to micrometres."""
 ROTOR = 1e4
-"""What a geared motor's rotor adds to its joint: parts of the inertia of a rod as long as the robot."""
+"""Rotor inertia of a geared motor: fraction of the inertia of a rod as long as the robot."""
 LAG = 0.004
 """Time constant of a motor's velocity servo with that rotor (s)."""
 CUT = 100.0
-"""What is added to a joint through which a loop is cut: parts of the same inertia; its light body yields without."""
+"""Inertia added to a joint through which a loop is cut: fraction of the same; its light body yields without."""
 DAMPING = 1e-3
-"""Of passive joints, as a part of that inertia a second."""
+"""Damping of passive joints, as a fraction of that inertia per second."""
 DRIVEN = 100.0
 _WEIGHTS = {"F": 0.0, "R": 1.0, "P": 1.0, "C": 2.0, "U": 2.0, "E": 3.0, "S": 4.0}
 

@@ -24,7 +24,7 @@ COLOURS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [0, 1, 1], [1, 0
 """Colours of the observed legs, on black; the others are dark grey."""
 GREY = 0.12
 PURE = 60.0
-"""How far (of 255) a pixel may be from the colours between black and a leg's to count as that leg's."""
+"""Largest distance (of 255) of a pixel from the colours between black and a leg's to count as that leg's."""
 BLACK = 8.0
 """Lightness (of 255) below which nothing is there."""
 KEPT = 0.8
@@ -34,7 +34,7 @@ REACH = 3.0
 
 
 def vision() -> Any:
-    """The module cv2; raises ``MissingExtra`` where it is not installed."""
+    """Return the module cv2; raises ``MissingExtra`` if it is not installed."""
     try:
         import cv2
     except ImportError:
@@ -43,7 +43,7 @@ def vision() -> Any:
 
 
 def drawing() -> Any:
-    """The module mujoco, ready to draw without a screen; raises ``MissingExtra`` where it is not installed."""
+    """Return the module mujoco, ready to draw without a screen; raises ``MissingExtra`` if it is not installed."""
     os.environ.setdefault("MUJOCO_GL", "egl")
     return simulator("rendering images")
 

@@ -50,8 +50,24 @@ class Scatter(Record, all_recorded=True):
 class Servo(Result, shown_as="servo"):
     """Servo run: request, run, outcome, crossings.
 
-    With noise the outcome is that of the same loop without noise, continued from the end of the noisy run; ``spread``
-    is the distance of the noisy run from there.
+    Attributes
+    ----------
+    start, goal, pose
+        Start, goal and final pose of the platform (m, rad, in the base frame).
+    desired
+        Measured values at the goal.
+    run
+        Times (s), configurations and commands.
+    outcome
+        Outcome; with noise that of the same loop without noise, continued from the end of the noisy run.
+    errors
+        Norms of the errors of the k observations along the run, (n, k).
+    way, turns
+        Position (m, (n, 3)) and rotation from the goal (rad, (n,)) of the platform along the run.
+    track
+        Singularities along the run.
+    spread
+        Distance of a noisy run from the final pose; None without noise.
     """
 
     setup: Annotated[ObservedRobot, FLAT]
@@ -87,7 +103,7 @@ class Servo(Result, shown_as="servo"):
         """Final pose."""
         return self.pose_of(self.settled)
 
-    coordinates = Shown(FileCoordinates, lambda self: FileCoordinates.of(self.settled), "at the end")
+    coordinates = Shown(FileCoordinates, lambda self: FileCoordinates.of(self.settled), "joint coordinates at the end")
 
     def pose_of(self, at: ClosedConfiguration) -> Pose:
         """Return the platform's pose at a configuration."""

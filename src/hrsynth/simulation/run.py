@@ -230,7 +230,8 @@ class _Stretch:
         return times, states, TIME if until == horizon else None
 
     def _end(self, time: float, y: Array, state: State) -> tuple[str, State] | None:
-        """Why a run with steady, exact directions ends at y (n,), if it does, and the state in which it ends."""
+        """Return the reason for which a run with constant, exact directions ends at y (n,), if it does, and its final
+        state."""
         command = state[1]
         if command.size <= SERVED:
             return SERVED_AT, state

@@ -1,4 +1,4 @@
-"""The certified radius: from how far around a goal every start is proved to end there (docs/pages/proofs.md).
+"""Proved attraction radius of a goal (docs/pages/proofs.md, section 14).
 
 In cones about the goal the error E = ½‖e‖² is proved to rise along every ray until it is at least c. Then no run, along
 which E falls, leaves the component of {E < c} that holds the goal; the goal is its only critical point; and all starts
@@ -52,7 +52,7 @@ class CertifiedRadius(Value):
     boxes: int
     reason: str
     undamped: float = 0.0
-    """The same of the law where it is not damped (characteristic lengths, radians)."""
+    """Radius while the law is not damped (characteristic lengths, radians)."""
     aside: bool = False
     """Flag: positions are of another platform point than that of the printed poses."""
 

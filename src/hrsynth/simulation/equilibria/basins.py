@@ -68,9 +68,8 @@ NOT_REACHED = -1
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BasinEnd(Value):
-    """Outcome of some runs: the ``ending`` of one of them, simulated separately; the platform's pose X (4, 4) and ‖e‖
-    if they converge to one pose; their number and fraction; ``example`` is the pose of one of the starts, as ``servo``
-    takes it."""
+    """Outcome of some runs, that of one simulated separately; the platform's pose X (4, 4) and ‖e‖ if they converge to one
+    pose; their number and fraction; ``example`` is the pose of one of the starts, as ``servo`` takes it."""
 
     run_outcome: Annotated[RunOutcome, FLAT]
     pose: Recorded[Pose | None]
@@ -95,10 +94,19 @@ class CertifiedPart(NamedTuple):
 class Basins(Result, shown_as="basins"):
     """Outcome of the run from each pose of a grid.
 
-    ``cells`` has the number of the outcome, in the grid's shape, −1 if the robot cannot start there; ``damped`` the
-    starts whose runs meet a singularity, where the law is damped. ``batched``: runs were integrated together;
-    ``followed`` of them were then simulated separately because that could not continue, and of ``checked`` others
-    ``agreed`` ended at the same pose.
+    Attributes
+    ----------
+    ends
+        Outcomes with their poses and numbers of starts.
+    cells
+        Index of the outcome of each start, in the grid's shape; −1 if the robot cannot start there.
+    damped
+        Starts whose runs meet a singularity, where the law is damped.
+    batched
+        Flag: runs were integrated together; ``followed`` of them were then simulated separately because that could not
+        continue, and of ``checked`` others ``agreed`` ended at the same pose.
+    certified
+        Proved attraction radius of the goal.
     """
 
     setup: Annotated[ObservedRobot, FLAT]

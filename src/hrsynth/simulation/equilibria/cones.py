@@ -25,7 +25,7 @@ from .pose_error import Number, PoseError
 LONG_SLICE = 1 / 16
 """Length of a slice above which it is made shorter before its cone is cut."""
 LONGER = 1.5
-"""By how much the next slice is longer where one is proved."""
+"""Factor by which the next slice is longer after a proved one."""
 
 
 @dataclass(eq=False)

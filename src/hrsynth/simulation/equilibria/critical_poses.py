@@ -45,11 +45,11 @@ from .pose_system import LegSystem, unbound
 LONGEST_STEP = 0.25
 """Longest change of a coordinate in a step."""
 Fit = Callable[[Array], NDArray[np.bool_]]
-"""Which of configurations (c, N) will do."""
+"""Test of configurations (c, N)."""
 BESIDE = (0.1, 0.3, 0.6, 1.0)
-"""How far (characteristic lengths, components of a quaternion) starts lie beside poses that were found, about."""
+"""Distance (characteristic lengths, components of a quaternion) of starts from poses already found, about."""
 FARTHER = 3.0
-"""Where legs do not end it, the box of starts is this many times as wide as that which is covered."""
+"""Factor of the box of starts over the searched one, if legs do not bound it."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -22,11 +22,11 @@ from ...tolerances import COMMAND_CUTOFF, COMMAND_STEP, CRITICAL, CRITICAL_FLAT,
 from .error import CriticalPointEquations, ErrorSystem
 
 LONGEST_STEP = 0.25
-"""Longest change of a coordinate in a step (characteristic lengths, radians)."""
+"""Largest change of a coordinate in a step (characteristic lengths, radians)."""
 SHARPENING_STEPS = 4
 """Newton's steps from a critical point that was found."""
 WALK_STEP = 0.3
-"""The same of a random step between starts."""
+"""Largest change of a coordinate in a random step between starts."""
 
 
 class Equations(Protocol):
@@ -45,7 +45,7 @@ class CriticalPointProblem(Protocol):
     """Whose critical points are sought."""
 
     def at(self, values: Sequence[Any]) -> Equations:
-        """Its equations at values (N,) of (c,) each."""
+        """Return the equations at values (N,) of (c,) each."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -175,7 +175,7 @@ def close_loops(system: ErrorSystem, q: Array, steps: int = 12) -> Array:
 
 
 def are_closed(system: ErrorSystem, q: Array, within: float = CRITICAL) -> NDArray[np.bool_]:
-    """At which configurations (c, N) all equations of the loops hold, to a residual."""
+    """Return True for configurations (c, N) at which all equations of the loops hold, to a residual."""
     return np.asarray(np.linalg.norm(system.closures(q)[0], axis=-1) < within)
 
 

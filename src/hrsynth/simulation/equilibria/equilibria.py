@@ -392,7 +392,7 @@ class EquilibriumSearch:
             return None
 
     def _side(self, at: ClosedConfiguration) -> str | None:
-        """On which side of the Type 2 locus a configuration is, seen from the goal; None where that is not known."""
+        """Return the side of the Type 2 locus on which a configuration lies, relative to the goal; None if unknown."""
         if self._condition is None:
             return None
         found, condition = self._condition
@@ -436,7 +436,7 @@ class EquilibriumSearch:
         return [each for each, kept in zip(found, good, strict=True) if kept]
 
     def _near_mode(self, q: Array) -> NDArray[np.bool_]:
-        """Near which of coordinates (c, N) configurations are of that mode."""
+        """Return True for coordinates (c, N) near which configurations are of that mode."""
         good, rng = np.zeros(len(q), dtype=bool), np.random.default_rng(0)
         # what lies nearby may be nearly singular as well: then a little farther away
         for number in range(MODE_TRIES):

@@ -95,10 +95,10 @@ class Equilibrium(OfConfiguration, Record):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SignedModes(Value):
-    """The poses at which the error vanishes with the directions of the legs ``reversed`` opposite to the desired ones:
-    the list of all modes with these, None if it could not be made or none was met; ``boxes``: how many such poses boxes
-    prove, None if they prove nothing, in ``turns`` turns of a platform that translates (lists of modes cover that of
-    the goal)."""
+    """Poses with zero error, the directions of the legs ``reversed`` opposite to the desired ones: the list of all
+    modes with these, None if it could not be computed or none was met; ``boxes`` is the number of such poses proved
+    by boxes, None if they prove nothing, in ``turns`` rotations of a platform that translates (lists of modes cover
+    that of the goal)."""
 
     reversed: Recorded[tuple[str, ...]]
     listed: AssemblyModes | None
@@ -138,7 +138,7 @@ class ProvedCriticalPoint(Value, all_recorded=True):
 
 
 class LockedRegion(NamedTuple):
-    """A place ``p`` (m) of the platform's point at which legs may lock each other; nothing was searched within this
+    """Position ``p`` (m) of the platform's point near which legs may lock each other; nothing was searched within this
     distance of it."""
 
     p: Annotated[Array, list[float]]
@@ -158,8 +158,10 @@ class CompletenessReport(Value):
     result: Annotated[SubdivisionResult, FLAT]
     only_proved: Recorded[tuple[ProvedCriticalPoint, ...]]
     only_found: Recorded[int]
-    within: Annotated[float | None, As("within_m"), "of the goal, null if the legs bound the box"]
-    shorter: Annotated[float | None, As("shorter_m"), "null if no rod slides"] = None
+    within: Annotated[float | None, As("within_m"), "extent of the box about the goal; null if the legs bound it"]
+    shorter: Annotated[
+        float | None, As("shorter_m"), "length of sliding rods below which nothing was searched; null if none"
+    ] = None
     rotated_outside: Recorded[int] = 0
     outside_searched: Recorded[int] = 0
 
@@ -242,9 +244,9 @@ class CompletenessReport(Value):
         assert error is not None
         return np.asarray(error.length * (error.p + error.shifts @ x))
 
-    proved = Shown(int, lambda self: len(self.result.found), "critical poses")
-    open = Shown(int, lambda self: len(self.result.open), "boxes")
-    turns = Shown(int, lambda self: len(self.result.turns), "of a platform that only translates")
+    proved = Shown(int, lambda self: len(self.result.found), "number of critical points")
+    open = Shown(int, lambda self: len(self.result.open), "number of undecided boxes")
+    turns = Shown(int, lambda self: len(self.result.turns), "number of rotations of a platform that only translates")
     reason_record = Shown(str | None, lambda self: self.reason or None, As("reason"))
 
 
@@ -252,11 +254,23 @@ class CompletenessReport(Value):
 class Equilibria(Result, shown_as="equilibria"):
     """Equilibria of the servo loop with the measured values of one pose, the goal.
 
-    ``points``: isolated equilibria, the goal first, then stable ones. ``families``: one equilibrium of each continuous
-    family. ``lists``: assembly modes and antipodal poses of each combination of signs, those that were met first.
-    Equations of the loops ``measured`` are met only to rounding and are not enclosed. ``search`` has the statistics of
-    the search, ``subdivision`` the proof of completeness (None if not requested). ``depth`` is the law's depth in
-    images; if the law assumes it, ``curvatures`` are real parts of eigenvalues of the linearised loop over −gain.
+    Attributes
+    ----------
+    points
+        Isolated equilibria, the goal first, then stable ones.
+    families
+        One equilibrium of each continuous family.
+    lists
+        Assembly modes and antipodal poses of each combination of signs, those that were met first.
+    measured
+        Loops with equations that hold only to rounding and are not enclosed.
+    search
+        Statistics of the search.
+    subdivision
+        Completeness by subdivision; None if not requested.
+    depth
+        Depth in images that the law assumes. Unless it is ``exact``, ``curvatures`` are real parts of eigenvalues of
+        the linearised loop over −gain.
     """
 
     setup: Annotated[ObservedRobot, FLAT]

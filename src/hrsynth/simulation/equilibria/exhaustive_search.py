@@ -48,29 +48,29 @@ class SubdivisionResult(Value):
 
     found: tuple[CriticalBox, ...]
     open: tuple[tuple[Array, Array], ...]
-    share: Annotated[float, "of the undecided boxes"]
+    share: Annotated[float, "fraction of the space in undecided boxes"]
     boxes: Recorded[int]
     bounded: bool
     reason: str = ""
     box: tuple[Array, Array] | None = None
-    """Where it was looked: the lower and the upper corner, in coordinates about the goal; None: everywhere."""
+    """Searched box: lower and upper corner, in coordinates about the goal; None: all poses."""
     error: PoseError | None = None
     short: tuple[ClosedFormLeg, ...] = ()
-    """Rods that slide and turn as they like: where one is shorter than ``SHORTEST_ROD`` it was not looked."""
+    """Freely rotating sliding rods; poses at which one is shorter than ``SHORTEST_ROD`` were not searched."""
     struts: Struts | None = None
-    """The legs of a platform that translates, whose joints' own singularities and all whose turns were looked at."""
+    """Legs of a platform that translates, whose joints' own singularities and all whose rotations were searched."""
     locked: tuple[tuple[Array, Array], ...] = ()
-    """Places (middle and half edges, in coordinates about the goal) at which equations of the legs may be dependent, so
-    that legs lock each other: there it was not looked."""
+    """Places (centre and half edges, in coordinates about the goal) at which equations of the legs may be dependent, so
+    that legs lock each other; they were not searched."""
     unread: Annotated[tuple[str, ...], "legs at whose locked joints nothing was searched"] = ()
-    """Legs in space with joints of which it is not known where they lock: there it was not looked."""
+    """Spatial legs with joints whose locked poses are unknown; these were not searched."""
 
     loop: LoopError | SpringError | None = None
     """Observed legs, if equilibria were sought by the forces of two or three. Not searched: poses at which an
     unobserved leg is stretched, or at which at least ``flat`` observed directions are at right angles to the desired
     ones."""
     spent: bool = False
-    """Whether boxes are left open because no more were allowed."""
+    """Flag: boxes are undecided because the limit was reached."""
 
     @property
     def complete(self) -> bool:

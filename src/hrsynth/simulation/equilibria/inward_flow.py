@@ -52,7 +52,8 @@ class InwardProver:
         return 0.0
 
     def inwards(self, middle: Array, half: Array) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
-        """In which boxes all legs reach, J has full rank and runs lead inwards; along which axis to cut the others."""
+        """Return True for boxes in which all legs reach, J has full rank and runs lead inwards; and the axes along
+        which to cut the others."""
         n, count = middle.shape[1], len(middle)
         x = [affine(middle[:, i], half[:, i, None] * np.eye(n)[i], np.zeros(count)) for i in range(n)]
         found, limbs = self.rates.jacobian.at(x), len(self.error.limbs)

@@ -32,7 +32,7 @@ from .pose_error import NotEnclosed, Number, PoseError
 from .subdivision import CriticalBox, Subdivision, forms_of, hull
 
 NARROWINGS = 16
-"""How many times the place of a zero is narrowed."""
+"""Number of times that the place of a zero is narrowed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +121,7 @@ class LoopError(JointError):
 
     @property
     def _arm(self) -> Array:
-        """From the second tip to the first at the goal, as far as it turns."""
+        """Vector from the second tip to the first at the goal, as far as it rotates."""
         one, two = (self.error.limbs[i].tip.turned for i in self.joints)
         return np.asarray(self.error.R @ (one - two))
 

@@ -53,7 +53,7 @@ class PlaneError(JointError):
     forms: Array = field(kw_only=True)
     """Quadratic forms (l, 4, 4) of quaternions that vanish."""
     one: int = field(default=0, kw_only=True)
-    """Which component is 1."""
+    """Component that is 1."""
 
     @classmethod
     def families(cls, setup: ObservedRobot, goal: ClosedConfiguration) -> list[PlaneError]:
@@ -187,7 +187,7 @@ class PlaneError(JointError):
         return found
 
     def parts(self, y: Sequence[Any], known: Number) -> tuple[list[Dual], list[Sequence[Dual]], list[Dual]]:
-        """As for a pose that is free; and the forms that vanish."""
+        """Return the parts as for a free pose; and the forms that vanish."""
         g, seen, margins = super().parts(y, known)
         if len(self.forms):
             q, number = self.unknowns(y, range(self.along.shape[1], self.freedoms)), self.make_constant(known)

@@ -64,7 +64,7 @@ class Twist:
 
 
 class NotEnclosed(Exception):
-    """Why the error has no enclosure over poses: the reason, for the answer."""
+    """Reason why the error has no enclosure over poses."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -131,11 +131,11 @@ class PoseError(Value):
     limbs: tuple[ClosedFormLeg, ...]
     seen: tuple[ObservedDirection, ...]
     fitted: tuple[str, ...] = ()
-    """What was fitted to samples and not read from the joints."""
+    """Forms that were fitted to samples, not read from the joints."""
     limits: tuple[str, ...] = ()
-    """Joints whose limits are not looked at."""
+    """Joints whose limits are ignored."""
     coordinates: PathCoordinates | None = None
-    """What reads poses of configurations."""
+    """Reader of poses of configurations."""
 
     @classmethod
     def of(cls, setup: ObservedRobot, goal: ClosedConfiguration) -> PoseError:

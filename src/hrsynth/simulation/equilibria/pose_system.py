@@ -60,7 +60,7 @@ class Piece(Value):
         return self.held and self.limb is not None and unbound(self.limb)
 
     def own(self, y: Array) -> Array:
-        """Its own coordinates (c, j)."""
+        """Coordinates of the leg (c, j)."""
         return y[:, self.place or slice(0)]
 
     @cached_property
@@ -257,7 +257,7 @@ class LegSystem(Value):
         return np.asarray(self.error.p + y[:, : self.quaternion.start] @ self.error.shifts.T)
 
     def tip(self, piece: Piece, y: Array) -> Array:
-        """Its tip (c, 3)."""
+        """Return the tip of a leg (c, 3)."""
         q = y[:, self.quaternion]
         arm = np.einsum("kij,ci,cj->ck", piece.bends, q, q) if q.shape[1] else piece.bends[:, 0, 0]
         return np.asarray((self.point(y) if piece.follows else 0.0) + piece.constant + arm + np.zeros((len(y), 3)))
@@ -410,7 +410,7 @@ class PoseEquations:
 
 
 def _along(local: LocalDerivatives, T: Array, place: slice | None) -> Array:
-    """Its gradient (c, N)."""
+    """Return the gradient (c, N)."""
     found = np.einsum("ck,ckn->cn", local.t, T)
     if place is not None:
         found[:, place] += np.reshape(local.o, (-1, place.stop - place.start))

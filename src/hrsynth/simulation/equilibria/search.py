@@ -289,8 +289,8 @@ def in_mode(system: ErrorSystem, setup: ObservedRobot, q: Array) -> NDArray[np.b
 
 
 def along_all(system: ErrorSystem, q: Array) -> NDArray[np.bool_]:
-    """At which of critical points (c, N) E is critical along all motions that the loops leave to first order: where two
-    families of closures meet, multipliers without bound would hold any slope across these."""
+    """Return True for critical points (c, N) at which E is critical along all motions that the loops leave to first
+    order: where two families of closures meet, multipliers without bound would hold any slope across these."""
     rates = system.closures(q)[1]
     if system.supposes or not rates.shape[1]:
         return np.ones(len(q), dtype=bool)

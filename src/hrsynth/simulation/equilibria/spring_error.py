@@ -50,7 +50,7 @@ from .pose_error import NotEnclosed, Number, PoseError
 from .subdivision import CriticalBox, Subdivision, forms_of
 
 NEAREST_FAR = 2.0
-"""How far (characteristic lengths) planes are from which on they count as far away."""
+"""Distance (characteristic lengths) from which planes count as far away."""
 PAIRS, OTHERS = ((0, 1), (0, 2), (1, 2)), ((1, 2), (0, 2), (0, 1))
 """The pairs of three rods; and those of the others, of each."""
 
@@ -331,7 +331,7 @@ class SpringError(JointError):
         )
 
     def tell_pose(self, one: int, far: int | None) -> BoxFormula:
-        """Its coordinates there."""
+        """Return its coordinates there."""
 
         def formula(y: Sequence[Any], number: Number) -> list[Any]:
             at, m = self.springs(y, number), self.plane(y, number)[0]

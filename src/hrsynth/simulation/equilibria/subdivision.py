@@ -45,11 +45,11 @@ from .joint_bounds import narrow_joints
 from .joint_error import JointError
 
 WIDER = (1.25, 4.0)
-"""By how much boxes are larger in which exactly one zero is to be proved, one after the other."""
+"""Factors by which boxes are enlarged, one after the other, to prove exactly one zero."""
 INFLATED = 4.0
-"""How many times as large as what numbers leave open of a zero nearby such boxes are at least."""
+"""Least size of such boxes over the uncertainty of a zero nearby."""
 AROUND = 16.0 ** np.arange(4, -1, -1)
-"""How many times as large as the smallest boxes those are at least that they hold, one after the other."""
+"""Least sizes of enclosing boxes over the smallest boxes, one after the other."""
 SINGULAR = -2
 """In the place of an axis: a box is left open, ∇g may lose rank in it."""
 STRETCHED = 8.0
@@ -90,14 +90,14 @@ class Subdivision:
     vanishing: bool = False
     boxes: int = 0
     spent: bool = False
-    """Whether there were boxes left as so many had been looked at as were allowed."""
+    """Flag: boxes were left when the limit was reached."""
     left: list[tuple[Array, Array]] = field(default_factory=list)
     lost: list[tuple[Array, Array]] = field(default_factory=list)
     """Small boxes in which the equations of the legs may be dependent."""
     proved: list[tuple[Array, Array]] = field(default_factory=list)
     """Coordinates and multipliers, and the room about them, in which exactly one zero is proved."""
     flat: list[tuple[Array, Array, Array]] = field(default_factory=list)
-    """The same of zeros that are flat, the room in a frame, and this (columns)."""
+    """Zeros that are flat, the room in a frame, and this (columns)."""
 
     singular: float = SINGULAR_BOX
     """Part of the whole: boxes with edges below it in which equations may be dependent are not cut further."""
