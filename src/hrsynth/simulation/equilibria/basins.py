@@ -68,8 +68,8 @@ NOT_REACHED = -1
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BasinEnd(Value):
-    """Outcome of some runs, that of one simulated separately; the platform's pose X (4, 4) and ‖e‖ if they converge to one
-    pose; their number and fraction; ``example`` is the pose of one of the starts, as ``servo`` takes it."""
+    """Outcome of some runs, that of one simulated separately; the platform's pose X (4, 4) and ‖e‖ if they converge to
+    one pose; their number and fraction; ``example`` is the pose of one of the starts, as ``servo`` takes it."""
 
     run_outcome: Annotated[RunOutcome, FLAT]
     pose: Recorded[Pose | None]

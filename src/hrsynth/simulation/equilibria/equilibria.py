@@ -128,7 +128,7 @@ def equilibria(
 
     Examples
     --------
-    >>> hrsynth.equilibria("rrrrr_m1", goal="x=0,y=0.25").attracting[0].kind
+    >>> hrsynth.equilibria("rrrrr_m1", goal="x=0,y=0.25").stable[0].kind
     'goal'
     """
     setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed)
