@@ -49,7 +49,7 @@ def test_every_command_takes_a_mode():
     answer = hrsynth.path(robot, "1,3,5", start="mode:1", goal="mode:2")
     assert [str(end.pose) for end in (answer.start, answer.goal)] == [str(mode.pose) for mode in listed.modes]
     run = hrsynth.servo(robot, "1,3,5", start="mode:2", goal=str(listed.pose))
-    assert (run.run_outcome.name, run.run_outcome.matched) == ("mode", 2)
+    assert (run.run_outcome.name, run.run_outcome.matched) == ("assembly mode", 2)
 
 
 @pytest.mark.some(1)

@@ -222,14 +222,14 @@ def test_a_pose_that_is_not_finite_is_not_reached(robot: str, compiled: bool) ->
 @pytest.mark.parametrize(
     ("legs", "cones", "word"),
     [
-        ("1,4", [0.1, 0.1, 0.1], "how many"),
+        ("1,4", [0.1, 0.1, 0.1], "number of half-angles"),
         ("1,4", -1.0, "more than 0"),
         ("1,4", 0.0, "more than 0"),
-        ("1,4", np.pi / 2, "right angle"),
-        ("1,4", np.nan, "right angle"),
-        ("1,4", [0.1, np.inf], "right angle"),
+        ("1,4", np.pi / 2, "less than pi/2"),
+        ("1,4", np.nan, "less than pi/2"),
+        ("1,4", [0.1, np.inf], "less than pi/2"),
         (["1", "1"], 0.1, "twice"),
-        ("14", 0.1, "a leg of the batch"),
+        ("14", 0.1, "unknown leg of the batch"),
         ([], 0.1, "nothing is observed"),
     ],
 )
@@ -374,7 +374,7 @@ def test_no_pose_one_pose_and_poses_out_of_reach(compiled: bool) -> None:
 
 def test_what_a_batch_refuses() -> None:
     _, batch = shipped_batch("i4l")
-    with pytest.raises(BadRequest, match="a leg of the batch"):
+    with pytest.raises(BadRequest, match="unknown leg of the batch"):
         batch.evaluate(batch.home[None], ["1"])
     with pytest.raises(BadRequest, match="nothing is observed"):
         batch.evaluate(batch.home[None], [])

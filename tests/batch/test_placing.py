@@ -140,7 +140,7 @@ def test_a_batch_that_disagrees_with_pinocchio_is_refused(monkeypatch: pytest.Mo
     quick = Quick.of(placer, setup.samples.observation_model)
     assert quick is not None
     monkeypatch.setattr(
-        "hrsynth.analysis.singularity.batch_spectrum.interaction_matrix", lambda found: 1.01 * found.convergence_rates
+        "hrsynth.analysis.singularity.batch_spectrum.interaction_matrix", lambda found: 1.01 * found.rates
     )
     with pytest.raises(Disagreement):
         quick.spectrum([member.configuration for member in setup.all_samples.members], spectrum)

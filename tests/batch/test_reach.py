@@ -429,7 +429,7 @@ def test_parts_that_depend_on_each_other_are_said_to() -> None:
     1987); the nearest pose that is told is one of these, and can be asked for."""
     setup = setting_of("3rps")
     all_samples = setup.all_samples
-    words = "has 3 freedoms, and at zero and at a random configuration parts of this pose depend on each other"
+    words = "has 3 dof, and at zero and at a random configuration parts of this pose depend on each other"
     with pytest.raises(PoseNotReached, match=words) as refused:
         reach(all_samples.start, all_samples.observation_model, Pose.parse("z=0.32,rpy=0.1/0.05/0"))
     assert "blocked" not in str(refused.value)

@@ -112,7 +112,7 @@ def test_what_the_pose_alone_says_is_the_same(robot: str) -> None:
     np.testing.assert_array_equal(both.interaction_matrix[:2, :, :-1], alone.interaction_matrix[:2])
     assert not np.any(both.interaction_matrix[:2, :, -1])
     assert not batch.complete
-    with pytest.raises(BadRequest, match="a leg of the batch"):
+    with pytest.raises(BadRequest, match="unknown leg of the batch"):
         batch.evaluate(X, next(iter(batch.sliding)))
     for wrong in (s[:, 0], s[:2], np.hstack([s, s])):
         with pytest.raises(BadRequest, match="coordinates of slides"):

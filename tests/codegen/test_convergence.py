@@ -188,7 +188,7 @@ def test_axes_that_are_parallel_but_for_rounding() -> None:
     found = export(robot, "numpy", box_of(robot, 0.05))
     assert found.bounds is not None
     assert found.bounds.others == 3
-    assert "Whether each of 3 more equations of the loops holds is checked at run time" in found.code
+    assert "At run time the program checks that each of 3 more equations of the loops holds." in found.code
     assert "3 more equations" in describe_export(found)
     alone = replace(found.bounds, others=1)
     assert alone.more == "one more equation of the loops holds"

@@ -218,7 +218,7 @@ def test_code_tells_where_motors_are_the_only_ones() -> None:
     made = module_of(found.code)
     (low,), (high,) = found.proof.injective_box
     assert made.unique([[low], [0.0], [high], [high + 1e-9], [np.nan]]).tolist() == [True, True, True, False, False]
-    assert found.to_dict()["back"] == [[low], [high]]
+    assert found.to_dict()["injective_box"] == [[low], [high]]
 
 
 @pytest.mark.slow
@@ -369,7 +369,7 @@ def test_the_same_bytes_each_time(tmp_path: Path) -> None:
 
 
 def test_what_is_refused() -> None:
-    with pytest.raises(BadRequest, match=r"language"):
+    with pytest.raises(BadRequest, match=r"--lang"):
         export(four_bar(), "fortran")
     with pytest.raises(BadRequest):
         export(four_bar(), box="wheel=-1:1")

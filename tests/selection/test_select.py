@@ -120,7 +120,7 @@ def test_a_run_that_ends_elsewhere_discards_its_set() -> None:
     assert begun.discarded is None
     ran = work().ran(begun)
     assert ran.run is not None
-    assert ran.run.verdict == "mode"
+    assert ran.run.verdict == "assembly mode"
     assert "ends in: mode" in str(ran.discarded)
 
 
@@ -176,7 +176,7 @@ def ends(others: tuple[str, ...] | None, length: float) -> LoopEnds:
 
 def test_endings_rank_before_accuracy() -> None:
     """Fewer poses that attract, then a radius of a higher power of two; sets of which that is not known come last."""
-    ranked = [ends((), 0.05), ends((), 0.01), ends((), 0.0), ends(("mode",), 0.05), ends(None, 0.0)]
+    ranked = [ends((), 0.05), ends((), 0.01), ends((), 0.0), ends(("assembly mode",), 0.05), ends(None, 0.0)]
     ranks = [Candidate(("1",), "controllable", equilibria=each).rank for each in (*ranked, None)]
     assert ranks == sorted(ranks)
     assert ranks[:5] == sorted(set(ranks))
@@ -187,8 +187,14 @@ def test_endings_rank_before_accuracy() -> None:
 def test_why_fewer_legs_are_better() -> None:
     """Only where a set that holds them has more poses that attract, or a smaller radius; and of the largest such."""
     best = ("1", "2"), ends((), 0.03)
-    assert fewer_are_better(best, [(("1", "2", "3"), ends((), 0.02)), (("1", "3", "4"), ends(("mode",), 0.0))]) is None
-    worse = [(("1", "2", "3"), ends(("mode",), 0.03)), (("1", "2", "3", "4"), ends(("critical", "critical"), 0.03))]
+    assert (
+        fewer_are_better(best, [(("1", "2", "3"), ends((), 0.02)), (("1", "3", "4"), ends(("assembly mode",), 0.0))])
+        is None
+    )
+    worse = [
+        (("1", "2", "3"), ends(("assembly mode",), 0.03)),
+        (("1", "2", "3", "4"), ends(("critical", "critical"), 0.03)),
+    ]
     assert fewer_are_better(best, worse) == (
         "fewer legs are better here: with 1, 2 the stable equilibria found besides the goal are: none; with 1, 2, "
         "3, 4: 2 nonzero error; with redundant observation, nonzero errors can balance"

@@ -107,7 +107,7 @@ def test_a_robot_without_motors_has_no_bench():
 def test_a_joint_with_six_freedoms_has_no_mock_up():
     robot = load("delta")
     joint = Joint("loose", JointType.FREE, robot.base, robot.platform, np.zeros(3))
-    with pytest.raises(BadMechanism, match="six freedoms"):
+    with pytest.raises(BadMechanism, match="six dof"):
         mockup(robot.changed(joints=[joint]))
 
 

@@ -144,7 +144,7 @@ def test_amounts_that_are_none(text: str):
 def test_without_opencv_pictures_are_refused_in_one_line(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(__import__("sys").modules, "cv2", None)
     with pytest.raises(MissingExtra, match=r"hrsynth\[bench\]") as raised:
-        servo(load("delta"), start="x=0,y=0", goal="x=0.05,y=0", sense="rendered_images")
+        servo(load("delta"), start="x=0,y=0", goal="x=0.05,y=0", sense="images")
     assert raised.value.exit_status == 3
 
 

@@ -32,7 +32,7 @@ def test_a_leg_that_is_stretched_is_a_boundary_however_long_the_run_may_take() -
     )
     found = [scene.result(scene.loop().simulate(scene.start, lasts)) for lasts in (25, 75, 400)]
     assert [each.outcome for each in found] == [BOUNDARY] * 3
-    assert all("not watched is stretched" in each.run_outcome.reason for each in found)
+    assert all("an unobserved leg is at the limit of its reach" in each.run_outcome.reason for each in found)
     assert np.allclose(found[0].way[-1], found[1].way[-1], atol=1e-6)
     assert np.allclose(found[0].way[-1], found[2].way[-1], atol=1e-6)
 

@@ -403,9 +403,8 @@ def test_a_run_whose_time_ends_tells_the_rest_it_is_on_its_way_to():
     short = servo("3rrr_m1", time=6.0, **asked)
     assert short.outcome == "time"
     assert short.run_outcome.reason.endswith(
-        "; it was still on its way to a rest that attracts, found at the goal, where the distance left falls by a "
-        "factor of e every 2 s"
+        "; it was still approaching a stable equilibrium at the goal, with the time constant 2 s"
     )
     assert servo("3rrr_m1", **asked).outcome == "goal"
     far = servo("3rrr_m1", start="x=0.05,y=0", goal="x=0,y=0", time=1.0)
-    assert "rest" not in far.run_outcome.reason
+    assert "equilibrium" not in far.run_outcome.reason

@@ -55,9 +55,9 @@ def true(found: Servo, corners: Array = CORNERS) -> bool:
     here, wanted = picture(found.settled, corners), picture(found.target, corners)
     apart = float(np.abs(here - wanted)[:, :2].max())
     same = np.allclose(found.settled.pose("wrist_3_link"), found.target.pose("wrist_3_link"), atol=1e-6)
-    if found.outcome in ("goal", "mode"):
+    if found.outcome in ("goal", "assembly mode"):
         return apart < 1e-8 and here[:, 2].min() > 0 and same == (found.outcome == "goal")
-    if found.outcome == "lost from sight":
+    if found.outcome == "out of view":
         return bool(0 < here[:, 2].min() < 1e-2 and apart > 1e-3)
     if found.outcome == "local minimum":
         model, q = found.settled.model, found.settled.q
@@ -69,12 +69,12 @@ def true(found: Servo, corners: Array = CORNERS) -> bool:
         ]
         rising = np.array(errors).reshape(-1, 2)
         return apart > 1e-6 and bool(np.abs(rising[:, 0] - rising[:, 1]).max() < 1e-8)
-    return found.outcome in ("boundary", "time") and apart > 1e-9
+    return found.outcome in ("limit reached", "time") and apart > 1e-9
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "see",
+    "sensor",
     [
         POINTS,
         (
@@ -117,7 +117,9 @@ def test_a_depth_that_is_only_supposed_bends_the_way_and_may_make_the_goal_repel
 
 
 def test_a_depth_that_nothing_needs_is_refused() -> None:
-    with pytest.raises(BadRequest, match=r"--depth: .* got 'desired', expected none, or --sensor"):
+    with pytest.raises(
+        BadRequest, match=r"--depth desired: no observation needs a depth\. Omit it, or add .* --sensor"
+    ):
         hrsynth.servo("delta", start="x=0", goal="x=0.05", depth="desired")
 
 
@@ -168,7 +170,7 @@ def test_noise_in_pixels_needs_a_focal_length_and_keeps_the_platform_near_its_go
 
 @pytest.mark.some(1)
 @pytest.mark.parametrize(
-    ("see", "noise", "words", "unit", "most"),
+    ("sensor", "noise", "words", "unit", "most"),
     [
         (POINTS, "0.3px", "image points", "px", 0.3),
         (POINTS, "0.1deg", "angles", "degrees", 0.1),
@@ -179,8 +181,8 @@ def test_noise_is_told_in_the_unit_in_which_it_is_given(
     sensor: tuple[str, ...], noise: str, words: str, unit: str, most: float
 ) -> None:
     found = hrsynth.servo("gough_stewart", camera=SIZED, sensor=sensor, start=GOAL, goal=GOAL, noise=noise, time=0.4)
-    (told,) = (each for each in found.notes if "wrong" in each)
-    assert told.startswith(f"measured {words} were wrong by ")
+    (told,) = (each for each in found.notes if "errors" in each)
+    assert told.startswith(f"errors of the measured {words}: ")
     *_, largest, last = told.split()
     assert last == unit
     assert 0.2 * most < float(largest) <= most
@@ -202,7 +204,7 @@ def test_the_picture_of_a_camera_with_a_size_is_all_of_it(recwarn: pytest.Warnin
 def test_what_stands_behind_the_camera_is_refused() -> None:
     with pytest.raises(BadRequest, match="not in front of its camera at the start"):
         hrsynth.servo("gough_stewart", camera="eye=base@0,0,1", sensor=POINTS, start=START, goal=GOAL)
-    for options in ({"physics": True}, {"sense": "edges"}):
+    for options in ({"dynamics": True}, {"sense": "edges"}):
         with pytest.raises(BadRequest, match="segments"):
             platform(**options)
 
@@ -214,19 +216,19 @@ def test_a_run_ends_where_a_camera_loses_sight() -> None:
     home = hrsynth.observe("3rrr_m1").all_samples.start.pose("platform")[:3, 3]
     place = ",".join(f"{value:.6f}" for value in (home[0] + 0.5, home[1], home[2] - 0.92))
     options = {
-        "see": "depth:platform@1,0,0",
+        "sensor": "depth:platform@1,0,0",
         "start": f"x={home[0]:.6f},y={home[1]:.6f},phi=-0.25",
         "goal": f"x={home[0]:.6f},y={home[1]:.6f},phi=0.25",
     }
     found = hrsynth.servo("3rrr_m1", "1,2,3", f"eye=base@{place}/0,0,0/500,530,500", **options)
-    assert found.outcome == "lost from sight"
+    assert found.outcome == "out of view"
     assert "depth_1" in found.run_outcome.reason
     X = found.settled.pose("platform")
     x, y, z = X[:3, :3] @ [1, 0, 0] + X[:3, 3] - [float(word) for word in place.split(",")]
     assert x / z == pytest.approx(0.53, abs=2e-3)
     assert abs(y / z) < 0.5
     wide = hrsynth.servo("3rrr_m1", "1,2,3", f"eye=base@{place}/0,0,0/500,630,500", **options)
-    assert wide.outcome in ("goal", "mode")
+    assert wide.outcome in ("goal", "assembly mode")
 
 
 @pytest.mark.slow
@@ -294,8 +296,8 @@ def test_a_line_that_comes_to_the_cameras_centre_ends_the_run(tmp_path: Path) ->
         "x=0.0761,y=0.0114,z=1.1308,rpy=0.6922/-0.4723/-0.279",
         "x=-0.1098,y=-0.0291,z=1.0424,rpy=-0.5704/0.6009/-1.3175",
     )
-    assert found.run_outcome.name == "lost from sight"
-    assert "has no value there" in found.run_outcome.reason
+    assert found.run_outcome.name == "out of view"
+    assert "is undefined there" in found.run_outcome.reason
 
 
 @pytest.mark.slow
@@ -313,7 +315,7 @@ def test_supposed_depths_at_which_the_law_loses_rank_are_told(tmp_path: Path) ->
         depth="constant:1",
     )
     assert found.run_outcome.name == "local minimum"
-    assert "the depths that it supposes, lose rank" in found.run_outcome.reason
+    assert "the assumed depths, lose rank" in found.run_outcome.reason
 
 
 @pytest.mark.parametrize("depth", ["constant:1e300", "constant:0", "constant:nan", "constant", "near"])

@@ -1,8 +1,8 @@
-"""A machine that runs straight-line code on affine forms, compiled once by numba for all formulas.
+"""Machine for straight-line code on affine forms, compiled once by numba for all formulas.
 
-A form takes one row for its centre, one for each symbol and one for its radius, of a few boxes side by side. What
-becomes of radii is said by the functions of :mod:`..geometry.affine`, whose text is compiled too: the numbers are those
-of its arrays to the last bit.
+A form has one row for its centre, one for each symbol and one for its radius, of a few boxes side by side. Radii are
+computed by the functions of :mod:`..geometry.affine`, whose text is compiled too: the numbers are those of its arrays
+to the last bit.
 """
 
 from __future__ import annotations
@@ -80,15 +80,15 @@ class Work:
 
 
 def worth(steps: int, boxes: int) -> bool:
-    """Whether numba is there, and worth its start: after so much was done in NumPy, where each step costs as much as
-    some hundred boxes before the first. Sums of one box have another order there."""
+    """Return True if numba is installed, and worth its start: after enough work in NumPy, where each step costs as much
+    as some hundred boxes before the first. Sums of one box have another order there."""
     Work.done += steps * (boxes + BOXES_A_CALL)
     return Work.done > BOX_STEPS_IN_NUMPY and boxes > 1 and _compilable()
 
 
 @lru_cache(maxsize=1)
 def _compilable() -> bool:
-    """Whether numba is installed."""
+    """Return True if numba is installed."""
     return find_spec("numba") is not None
 
 
@@ -109,7 +109,7 @@ class MachineCode(Value):
         done: Sequence[Sequence[int]],
         outputs: Sequence[int | Term],
     ) -> MachineCode:
-        """That of the steps of a formula, where after each some results are needed no more."""
+        """Translate the steps of a formula; ``done`` are the results no longer needed after each."""
         numbers: list[Term] = []
         code: list[tuple[int, ...]] = []
         at: dict[Any, int] = {}

@@ -1,16 +1,17 @@
-"""How far the platform can be off when each direction is off by up to its cone's half-angle (docs/pages/proofs.md,
-section 10).
+"""Largest platform error if each direction has an error of up to its cone's half-angle (docs/pages/proofs.md, section
+10).
 
-With B_i = ψ_i² A_i A_iᵀ (A_i: from the error of direction i to the platform's), the largest error is the maximum over
-unit w of E(w) = Σ √(wᵀ B_i w). One cone: √λmax(B). Two cones: exact, here. Three and more: bounds, ``three_cones``.
+With B_i = ψ_i² A_i A_iᵀ (A_i: from the error of direction i to the platform's), the largest error is the maximum
+over unit w of E(w) = Σ √(wᵀ B_i w). One cone: √λmax(B). Two cones: exact, here. Three and more: bounds,
+``three_cones``.
 
 Upper bounds. For positive weights t of sum one, by Cauchy and Schwarz,
 
     E(w)² = (Σ √t_i · √(wᵀ B_i w / t_i))² ≤ Σ wᵀ B_i w / t_i ≤ λmax(Σ B_i / t_i).                               (1)
 
-For two cones the least of these bounds is the maximum itself: it is that over the convex hull of the points
-(wᵀ B₁ w, wᵀ B₂ w), and on the unit sphere of ℝ³ these make up a convex set (L. Brickman, On the field of values of a
-matrix, Proc. AMS 12, 1961).
+For two cones the least of these bounds is the maximum itself: it is that over the convex hull of the points (wᵀ B₁
+w, wᵀ B₂ w), and on the unit sphere of ℝ³ these make up a convex set (L. Brickman, On the field of values of a matrix,
+Proc. AMS 12, 1961).
 """
 
 from __future__ import annotations

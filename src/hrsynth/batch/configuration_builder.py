@@ -1,7 +1,7 @@
-"""From platform poses to closed configurations: the poses of all links by leg, then the joints' coordinates.
+"""Closed configurations at platform poses: the poses of all links by leg, then the joints' coordinates.
 
-Each leg's links start where its subproblem puts them and are closed by a few Gauss-Newton steps, all poses abreast;
-what comes out counts only where Pinocchio's own loops are closed.
+Each leg's links start from the solution of its subproblem and are closed by a few Gauss-Newton steps, all poses at
+once; a result counts only if Pinocchio's own loops are closed.
 """
 
 from __future__ import annotations
@@ -74,8 +74,9 @@ class ConfigurationBuilder(Value):
         return found
 
     def random_walk(self, count: int, seed: int = 0, steps: int = 40) -> Iterator[ClosedConfiguration]:
-        """``count`` random configurations: walks of up to ``steps`` small steps of the platform from its home, side by
-        side; a walk ends where the robot does not reach on, or comes near to a Type 1 singularity."""
+        """Yield ``count`` random configurations: walks of up to ``steps`` small steps of the platform from its zero
+        configuration, side by side; a walk ends where the robot cannot reach further, or comes near to a Type 1
+        singularity."""
         rng, batch = np.random.default_rng(seed), self.batch
         limit = FAST_DIRECTIONS * float(batch.evaluate(batch.home[None]).singular_values[0, 0])
         given = failed = 0
@@ -141,7 +142,8 @@ class ConfigurationBuilder(Value):
     def _guess(
         self, leg: Leg, form: ClosedFormLeg, frames: Mapping[str, Array], p: Array, R: Array
     ) -> tuple[dict[str, Array], Flags]:
-        """Where the leg's links start: its first link on its circle or line, the others turned as the observed one."""
+        """Return the start poses of the leg's links: its first link on its circle or line, the others rotated as the
+        observed one."""
         mechanism, seen = self.decomposition.mechanism, self.seen[leg.label]
         n = len(p)
         zero = mechanism.links[seen.link].pose[:3, :3] @ seen.direction
@@ -201,7 +203,7 @@ def _hold(mechanism: Mechanism, leg: Leg, name: str, placed: Mapping[str, Array]
 
 
 def coordinates(model: PinocchioModel, frames: Mapping[str, Array]) -> Array:
-    """The twin's q (n, nq) for poses of all links (n, 4, 4), metres."""
+    """Return the model's q (n, nq) for poses of all links (n, 4, 4), metres."""
     moved = _displacements(model, frames)
     n = len(next(iter(frames.values())))
     q = np.repeat(model.q0[None], n, axis=0)
@@ -218,14 +220,15 @@ def coordinates(model: PinocchioModel, frames: Mapping[str, Array]) -> Array:
 
 
 def rates(model: PinocchioModel, frames: Mapping[str, Array], link: str) -> tuple[Array, Array]:
-    """What the twin's velocities do at closed poses of all links (n, 4, 4), metres: how fast the loops open
-    (n, rows, nv), and the twists (n, 6, nv) of a link at the base's origin; characteristic lengths and radians."""
+    """Return the effect of the model's velocities at closed poses of all links (n, 4, 4), metres: the rates of the
+    closure residuals (n, rows, nv), and the twists (n, 6, nv) of a link at the base's origin; characteristic lengths
+    and radians."""
     moved, (tree, cuts) = _displacements(model, frames), model.spanned
     screws, rows = np.zeros((len(moved[link]), 6, model.nv)), [np.zeros((len(moved[link]), 0, model.nv))]
     moves = {model.mechanism.base: np.zeros(model.nv)}
 
     def beyond(joint: Joint, parent: str) -> Array:
-        """Which coordinates move what is beyond a joint, whose screws are added."""
+        """Return True for coordinates that move the links beyond a joint, whose screws are added."""
         found, places = moves[parent].copy(), sorted(model.coordinates.get(joint.name, ()))
         if places:
             own = joint if joint.predecessor == parent else joint.turned()
@@ -270,12 +273,12 @@ def _centre(joint: Joint, A: Array) -> Array:
 
 
 def _displacements(model: PinocchioModel, frames: Mapping[str, Array]) -> dict[str, Array]:
-    """What brought each link from the zero configuration to poses (n, 4, 4)."""
+    """Return the displacements of the links from the zero configuration to poses (n, 4, 4)."""
     return {name: X @ inverse(model.mechanism.links[name].pose) for name, X in frames.items()}
 
 
 def _coordinates(joint: Joint, R: Array, shift: Array) -> list[Array]:
-    """The coordinates of each of a joint's parts, (n, 1) or (n, 4), in the order of the twin's."""
+    """Return the coordinates of each of a joint's parts, (n, 1) or (n, 4), in the order of the model's."""
     match joint.type:
         case JointType.UNIVERSAL:
             first, second = joint.axes

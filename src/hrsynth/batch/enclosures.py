@@ -81,16 +81,15 @@ class BoxFormula(Value):
 
     @cached_property
     def machine(self) -> MachineCode:
-        """The same for the machine that numba compiles."""
+        """Formula translated for the machine that numba compiles."""
         return MachineCode.of(self.steps, self.done, self.outputs)
 
     def together(self, inputs: Sequence[AffineForms]) -> AffineForms:
-        """What is given out (boxes, outputs), for inputs of shape (boxes,); no number where a formula has a pole in a
-        box."""
+        """Return the outputs (boxes, outputs) for inputs of shape (boxes,); NaN where a formula has a pole in a box."""
         return self.machine.run(inputs) if worth(len(self.steps), len(inputs[0].r)) else stack(self._rows(inputs))
 
     def at(self, inputs: Sequence[AffineForms]) -> list[AffineForms]:
-        """The same, one after the other."""
+        """Return the outputs one after the other."""
         if not worth(len(self.steps), len(inputs[0].r)):
             return self._rows(inputs)
         found = self.machine.run(inputs)

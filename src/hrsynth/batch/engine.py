@@ -37,12 +37,12 @@ from .recognition import recognise_leg
 Flags = NDArray[np.bool_]
 EXTRAS = {"numba": "fast", "jax": "jax"}
 ROWS = ("reached", "u", "M")
-"""What the program of closed forms says at each pose."""
+"""Outputs of the program of closed forms at each pose."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Evaluation(Value):
-    """What a batch says about n poses with k legs watched; NaN where a pose is not reached.
+    """Values at n poses of a batch with k observed legs; NaN where a pose is not reached.
 
     ``interaction_matrix`` is Mᵀ (n, 3 k, d): the rates of the directions for the twists of ``twists`` ((6, d) or (n, 6,
     d), m and rad; zero for the rates of slides, which are in characteristic lengths). ``position`` (m) and
@@ -56,7 +56,7 @@ class Evaluation(Value):
     position: ErrorBound | None
     orientation: ErrorBound | None
     normals: tuple[Array | None, ...]
-    """For each watched leg whose direction only turns about a fixed axis: that axis."""
+    """Axis of each observed leg whose direction only rotates about a fixed axis."""
 
     @cached_property
     def singular_values(self) -> Array:
@@ -68,8 +68,8 @@ class Evaluation(Value):
 
     @cached_property
     def determinant(self) -> Array | None:
-        """The determinant (n,) of the directions' independent rates, None if their number is not that of the freedoms;
-        its sign changes where a path crosses a Type 2 singularity."""
+        """Determinant (n,) of the directions' independent rates, None if their number is not the platform dof; its sign
+        changes where a path crosses a Type 2 singularity."""
         u, M = self.directions, self.interaction_matrix.reshape(len(self.reached), len(self.normals), 3, -1)
         rows = []
         for i, normal in enumerate(self.normals):
@@ -81,9 +81,9 @@ class Evaluation(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Batch(Value):
-    """A compiled mechanism: each leg a closed form or solved by iteration, None if it hangs on a link that does not
-    move with the platform's pose; ``iterative`` are those that are solved, from which the platform's freedoms follow if
-    no closed form gives them."""
+    """Compiled mechanism: each leg a closed form or solved by iteration, None if it hangs on a link whose motion is no
+    function of the platform's pose; ``iterative`` are those that are solved, from which the platform dof follow if no
+    closed form gives them."""
 
     coordinates: PlatformCoordinates
     home: Array
@@ -91,13 +91,13 @@ class Batch(Value):
     legs: Mapping[str, ClosedFormLeg | IterativeLeg | None]
     iterative: Mapping[str, IterativeLeg]
     holds: Sequence[LegForce]
-    """Where the platform has other twists at each pose and legs in closed form say which: what they forbid."""
+    """Wrenches of the legs in closed form, if the platform has other twists at each pose."""
     normals: Mapping[str, Array | None]
     length: float
     sliding: Mapping[str, tuple[SlidingLink, ClosedFormLeg]]
     """Legs on links that slide on the platform: such a link, and the closed form as if it went with the platform."""
     programs: dict[tuple[tuple[str, ...], bool], Program] = field(default_factory=dict, repr=False)
-    """What was traced so far, by the legs that are watched, and whether slides are given."""
+    """Traced programs, by the observed legs, and by whether slides are given."""
 
     @classmethod
     def of(
@@ -108,7 +108,7 @@ class Batch(Value):
         configurations: Sequence[ClosedConfiguration],
     ) -> Batch | None:
         """Compile a mechanism with one direction per leg; None if something else is observed, or not from the base, or
-        a wrist cannot make every turn.
+        a tilt limit excludes some rotations.
 
         ``configurations`` are closed ones, the zero configuration first: what is recognised must hold at all of them.
         """
@@ -157,12 +157,12 @@ class Batch(Value):
 
     @property
     def complete(self) -> bool:
-        """Whether every leg is compiled: then ``reached`` says whether the robot reaches a pose."""
+        """Return True if every leg is compiled: then ``reached`` holds for the whole robot."""
         return all(leg is not None for leg in self.legs.values())
 
     @property
     def closed(self) -> bool:
-        """Whether one program of closed forms gives everything."""
+        """Return True if one program of closed forms gives everything."""
         return self.coordinates.constant and not self.iterative
 
     def evaluate(
@@ -174,20 +174,38 @@ class Batch(Value):
         slides: ArrayLike | None = None,
         compiled: Compiled | None = None,
     ) -> Evaluation:
-        """Everything at platform poses X (n, 4, 4) with ``legs`` watched (default: all), ``cones`` their half-angles
-        (rad; one, or one per leg). ``slides`` (n, m) are the coordinates of the P joints :attr:`slides` (m), by which
-        links of the platform slide on it: then the legs on these can be watched as well, and Mᵀ has one more column for
-        each (default: only what the pose alone determines).
+        """Evaluate the batch at platform poses.
 
-        X are poses that the platform can take as far as its own freedoms go; that is not checked. A pose that is not
-        finite is not reached. ``compiled`` asks for numba, or forbids it (default: if its kernels are already compiled
-        and worth starting); "jax" asks for jax, on the device that it has. Raises ``BadRequest`` for legs that are not
-        compiled, poses of another shape, half-angles of cones that are not between 0 and a right angle, and results
-        that are too large.
+        Parameters
+        ----------
+        X
+            Poses (n, 4, 4) in the base frame (m). They must agree with the platform dof, which is not checked. A pose
+            that is not finite is not reached.
+        legs
+            Observed legs (default: all).
+        cones
+            Half-angles of their cones (rad; one, or one per leg).
+        slides
+            Coordinates (n, m) of the P joints :attr:`slides` (m), by which links slide on the platform: then the legs
+            on these can be observed as well, and Mᵀ has one more column for each.
+        compiled
+            True for numba, False for NumPy, "jax" for jax (default: numba if its kernels are compiled and worth
+            starting).
+
+        Returns
+        -------
+        Evaluation
+            Values at the n poses.
+
+        Raises
+        ------
+        BadRequest
+            A leg that is not compiled, poses of another shape, half-angles not between 0 and a right angle, or a
+            result that is too large.
         """
         X = np.asarray(X, dtype=float)
         if X.ndim != 3 or X.shape[1:] != (4, 4):
-            raise BadRequest("poses of a batch: shape", X.shape, "(n, 4, 4)")
+            raise BadRequest("poses of a batch: wrong shape", X.shape, "(n, 4, 4)")
         s = self._slid(slides, len(X))
         slid = s is not None
         watched = self._watched(legs, slid)
@@ -198,7 +216,8 @@ class Batch(Value):
             raise BadRequest(
                 "the result of a batch takes too much memory (bytes)",
                 need,
-                f"at most {LARGEST_BATCH}; sweep goes through any number of poses in parts",
+                f"at most {LARGEST_BATCH}",
+                remedy="Evaluate the poses in parts with sweep.",
             )
         k, n = len(watched), len(X)
         quick = self.uses_numba(n, watched, half, slid=slid) if compiled is None else compiled
@@ -224,7 +243,7 @@ class Batch(Value):
         )
 
     def rows_at(self, X: Array, watched: Sequence[str]) -> tuple[Array, Array, Array]:
-        """Of closed forms: the reach margins of all legs (n, legs), 1 of a leg that always reaches; the directions
+        """Return the closed forms' reach margins of all legs (n, legs), 1 for a leg that always reaches; the directions
         (n, k, 3) of the ``watched`` ones and their rates (n, k, 3, d) for the twists of ``span``."""
         program, n = self._program(watched), len(X)
         rows = program.run(X, (*(f"margin_{name}" for name in self.legs), *ROWS[1:]))
@@ -234,7 +253,7 @@ class Batch(Value):
         return margins.T, u.T.reshape(n, k, 3), M.T.reshape(n, k, 3, d)
 
     def reaches(self, X: Array) -> Flags:
-        """Where closed forms alone reach the poses X (n, 4, 4), without the rest of ``evaluate``."""
+        """Return True where closed forms alone reach the poses X (n, 4, 4); cheaper than ``evaluate``."""
         return np.asarray(self._program(()).run(X, ROWS[:1])[0] > 0)
 
     def sweep(
@@ -249,14 +268,15 @@ class Batch(Value):
         s = np.asarray(slides, dtype=float)
         if not self.slides or s.shape != (n, len(self.slides)):
             raise BadRequest(
-                "coordinates of slides of a batch: shape",
+                "coordinates of slides of a batch: wrong shape",
                 s.shape,
-                f"({n}, {len(self.slides)})" if self.slides else "none: nothing slides on the platform",
+                f"({n}, {len(self.slides)})" if self.slides else None,
+                remedy="" if self.slides else "Omit them: nothing slides on the platform.",
             )
         return s
 
     def _twists(self, slid: bool) -> Array:
-        """The platform's twists for the columns of Mᵀ (m, rad): it rests where a link slides on it."""
+        """Return the platform's twists for the columns of Mᵀ (m, rad): zero where a link slides on it."""
         return np.hstack([self.span, np.zeros((6, len(self.slides)))]) if slid else self.span
 
     def _watched(self, legs: Sequence[str] | str | None, slid: bool = False) -> list[str]:
@@ -264,11 +284,11 @@ class Batch(Value):
         known = [name for name, leg in self.legs.items() if leg is not None or (slid and name in self.sliding)]
         for name in names:
             if name not in known:
-                raise BadRequest("a leg of the batch", name, known)
+                raise BadRequest("unknown leg of the batch", name, known)
             if names.count(name) > 1:
-                raise BadRequest("a leg is watched twice", name, known)
+                raise BadRequest("leg observed twice", name, remedy="Name each leg once.")
         if not names:
-            raise BadRequest("nothing is observed", "no leg", known)
+            raise BadRequest("nothing is observed: got no leg", expected=known)
         return names
 
     @cached_property
@@ -279,8 +299,8 @@ class Batch(Value):
     def uses_numba(
         self, n: int, legs: Sequence[str], cones: Array | None, enough: int = POSES_FOR_NUMBA, *, slid: bool = False
     ) -> bool:
-        """Whether numba is to do n poses by default: its kernels are there already, and they are ``enough``, or they
-        are so many that compiling pays."""
+        """Return True if numba computes n poses by default: its kernels are compiled and the poses are ``enough``, or
+        they are so many that compiling pays."""
         if not self.closed or n < enough or find_spec("numba") is None:
             return False
         return n >= POSES_FOR_COMPILING or (
@@ -294,15 +314,14 @@ class Batch(Value):
             raise MissingExtra(f"compiled={by!r}", EXTRAS[by])
         if not self.closed:
             raise BadRequest(
-                "a batch whose platform has other twists at each pose, or legs that are solved by "
-                "iteration, is not compiled",
-                True,
-                "compiled=False",
+                "a batch with iterated legs, or with platform twists that change with the pose, is not compiled",
+                remedy="Use compiled=False.",
             )
 
     def _program(self, watched: Sequence[str], slid: bool = False) -> Program:
-        """What closed forms say at a pose X, and how far links have ``slid`` on the platform: where it is ``reached``,
-        the directions ``u`` and rows ``M`` of the watched legs; zero for those that are solved by iteration."""
+        """Return the program of the closed forms at a pose X, with the displacement ``slid`` of links that slide on the
+        platform: ``reached``, the directions ``u`` and rows ``M`` of the observed legs; zero for those that are solved
+        by iteration."""
         key = tuple(watched), slid
         if key not in self.programs:
             self.programs[key] = self._trace(*key)
@@ -420,7 +439,7 @@ class Batch(Value):
 
     @cached_property
     def _reference(self) -> Array:
-        """The twists at home: which way round every other basis is."""
+        """Twists at the zero configuration, by which the signs of all other bases are chosen."""
         states = [self._follow(leg, self.home[None]) for leg in self.iterative.values()]
         rows = np.concatenate([each.wrenches() for each in states], axis=1)[0]
         return np.linalg.svd(rows)[2][rows.shape[1] - self.coordinates.dof :].T
@@ -436,7 +455,8 @@ def _holds(
     legs: Mapping[str, IterativeLeg],
     frames: Mapping[str, Array],
 ) -> tuple[LegForce, ...]:
-    """What the legs forbid the platform, where that is known in closed form and decides its twists; else nothing."""
+    """Return the legs' wrenches on the platform, if they are known in closed form and determine its twists; else
+    nothing."""
     if coordinates.constant or decomposition.point is not None or set(legs) != set(decomposition.labels):
         return ()
     span = _span(coordinates, decomposition.mechanism.length)
@@ -458,10 +478,10 @@ def _half_angles(cones: ArrayLike, k: int) -> Array:
     """Half-angles (k,) of the cones of k legs (rad)."""
     half = np.asarray(cones, dtype=float)
     if half.shape not in ((), (k,)):
-        raise BadRequest("half-angles of cones: how many", half.size, f"one, or {k}")
+        raise BadRequest("number of half-angles of cones", half.size, f"one, or {k}")
     for value in half.ravel():
         if not 0 < value < np.pi / 2:
-            raise BadRequest("half-angle of a cone (rad)", float(value), "more than 0, less than a right angle")
+            raise BadRequest("half-angle of a cone (rad)", float(value), "more than 0 and less than pi/2")
     return np.broadcast_to(half, (k,))
 
 

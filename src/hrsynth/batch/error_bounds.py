@@ -1,4 +1,4 @@
-"""From Mᵀ to the largest errors of position and orientation (docs/pages/proofs.md, section 10)."""
+"""Largest errors of position and orientation from Mᵀ (docs/pages/proofs.md, section 10)."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ ENTRIES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 @dataclass(frozen=True, eq=False)
 class ErrorBound:
-    """The largest error (n,) over all admissible errors of the directions, and a lower bound of it: the same for one
-    cone and for two, and where the error has one freedom. Infinite where a freedom is lost."""
+    """Largest error (n,) over all admissible errors of the directions, and a lower bound of it: equal for one cone and
+    for two, and where the error has one dimension. Infinite where a twist is not observed."""
 
     largest: Array
     lower: Array
@@ -77,7 +77,7 @@ def _constant_program(k: int, d: int, twists: bytes, cones: bytes) -> Program:
 
 
 def bounds_compiled(k: int, twists: Array, cones: Array) -> bool:
-    """Whether numba has compiled them already."""
+    """Return True if numba has compiled them already."""
     return _constant_program(k, twists.shape[1], twists.tobytes(), cones.tobytes()).is_compiled(OUTPUTS)
 
 
@@ -99,8 +99,8 @@ def trace_bounds(
     *reads: str,
     single: Sequence[Array | None] = (None, None),
 ) -> None:
-    """Add ``PARTS`` (upper and lower bound each) and ``clear``, where no freedom is lost, at poses where ``reached`` is
-    positive, for ``M``; twists (6, d) and cones (k) come from ``reads``."""
+    """Add ``PARTS`` (upper and lower bound each) and ``clear``, where all twists are observed, at poses where
+    ``reached`` is positive, for ``M``; twists (6, d) and cones (k) come from ``reads``."""
 
     def factor(M: Components, reached: Components) -> dict[str, Components]:
         """M = Q R by Gram and Schmidt, and where no column depends on those before it."""
@@ -177,8 +177,8 @@ def _solve_row(row: Components, R: Components) -> list[Any]:
 
 
 def _deficient(M: Array, twists: Array, cones: Array) -> Array:
-    """The bounds (4, n) where a freedom is lost: infinite where it moves what is asked for, else those of what is
-    seen; NaN where M is no number."""
+    """Return the bounds (4, n) where a twist is not observed: infinite where it moves the platform, else those of the
+    observed ones; NaN where M is NaN."""
     finite = np.asarray(np.isfinite(M).all(axis=(1, 2)))
     M = np.where(finite[:, None, None], M, 0.0)
     U, s, full = np.linalg.svd(M, full_matrices=True)

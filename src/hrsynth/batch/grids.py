@@ -22,8 +22,8 @@ TURNS = 180
 def ready(
     placer: ConfigurationBuilder, motion: PlatformMotion, goals: Sequence[PoseTask]
 ) -> tuple[dict[int, ClosedConfiguration], set[int]]:
-    """The configurations at goals whose free parts are as at home, by their place; and the places of goals that no pose
-    of the platform reaches in the working mode of the zero configuration."""
+    """Return the configurations at goals whose free parts are as at the zero configuration, by index; and the indices
+    of goals that no pose of the platform reaches in the working mode of the zero configuration."""
     X = np.array([motion.pose_of(goal) for goal in goals])
     found = {
         i: at
@@ -39,9 +39,9 @@ def ready(
 
 
 def poses_over(motion: PlatformMotion, grid: Grid, robot: str, places: Array) -> tuple[Array, Flags]:
-    """The platform poses (n, 4, 4) where the parts of a grid that vary have the values ``places`` (n, ndim); free parts
-    are as at home. Also which of them the platform can have at all. Raises ``BadRequest`` for parts that it cannot
-    change."""
+    """Return the platform poses (n, 4, 4) where the parts of a grid that vary have the values ``places`` (n, ndim),
+    free parts as at the zero configuration; and which of them the platform can have. Raises ``BadRequest`` for parts
+    that it cannot change."""
     first = motion.goal(grid.poses_at([(0,) * grid.ndim])[0], robot)
     columns = dict(zip(grid.names, places.T, strict=True))
     X = np.tile(motion.pose_of(first), (len(places), 1, 1))
@@ -59,7 +59,7 @@ def poses_over(motion: PlatformMotion, grid: Grid, robot: str, places: Array) ->
 
 
 def _some_turn(placer: ConfigurationBuilder, motion: PlatformMotion, X: Array) -> Flags:
-    """Whether some turn about the platform's one axis makes each of the poses X (n, 4, 4) one that is reached, (n,)."""
+    """Return True for poses X (n, 4, 4) that some rotation about the platform's one axis makes reachable, (n,)."""
     if len(X) == 0:
         return np.zeros(0, dtype=bool)
     turns = exponential(np.linspace(-np.pi, np.pi, TURNS)[:, None] * motion.rotations[:, 0])

@@ -44,8 +44,8 @@ that stay perpendicular."""
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ClosureRows(Value):
-    """The rows of joints: forces (i, j, n in i, point in i, point in j), moments (i, j, α in i, β in j, level); and
-    directions that coincide (i, j, α in i, β in j), which moments alone do not tell from opposite ones."""
+    """Rows of joints: forces (i, j, n in i, point in i, point in j), moments (i, j, α in i, β in j, level); and
+    directions that coincide (i, j, α in i, β in j), which moments alone do not distinguish from opposite ones."""
 
     forces: list[tuple[int, int, Array, Array, Array]] = field(default_factory=list)
     moments: list[tuple[int, int, Array, Array, float]] = field(default_factory=list)
@@ -77,7 +77,7 @@ class ClosureRows(Value):
         self.forces.extend((i, j, axis, at_i, at_j) for axis in np.eye(3))
 
     def stand(self, X: Array) -> NDArray[np.bool_]:
-        """Where no direction points the opposite way, (n,)."""
+        """Return True where no direction has the opposite sign, (n,)."""
         R = X[..., :3, :3]
         signs = [np.sum((R[:, i] @ alpha) * (R[:, j] @ beta), axis=1) > 0 for i, j, alpha, beta in self.upright]
         return np.all(signs, axis=0) if signs else np.ones(len(X), dtype=bool)
@@ -97,7 +97,7 @@ class ClosureRows(Value):
         return stacked(self.forces, 3), stacked(self.moments, 2)
 
     def residual(self, X: Array) -> Array:
-        """How far each row is from being kept, (n, rows)."""
+        """Return the residual of each row, (n, rows)."""
         (i, j, normal, at_i, at_j), (k, m, alpha, beta, level) = self._stacked
         R, o = X[..., :3, :3], X[..., :3, 3]
         way = o[:, j] + times(R[:, j], at_j) - o[:, i] - times(R[:, i], at_i)
@@ -110,7 +110,7 @@ class ClosureRows(Value):
         )
 
     def rates(self, X: Array) -> Array:
-        """Its derivatives by the twists of all links, (n, rows, links, 6)."""
+        """Return the derivatives by the twists of all links, (n, rows, links, 6)."""
         (i, j, normal, _, at_j), (k, m, alpha, beta, _) = self._stacked
         R, o = X[..., :3, :3], X[..., :3, 3]
         J = np.zeros((len(X), self.count, X.shape[1], 6))
@@ -212,7 +212,7 @@ class IterativeLeg(Value):
     def follow_from_zero(
         self, coordinates: PlatformCoordinates, home: Array, X: Array, span: Array
     ) -> IterativeLegStates:
-        """The chain at platform poses X (n, 4, 4), followed from ``home`` in small steps, all poses abreast."""
+        """Return the chain at platform poses X (n, 4, 4), followed from ``home`` in small steps, all poses at once."""
         p, R = coordinates.place(X)
         (p0,), (R0,) = coordinates.place(home[None])
         turn = logarithm(R @ R0.T) if self.turns(coordinates) else np.zeros_like(p)
@@ -226,7 +226,7 @@ class IterativeLeg(Value):
         return IterativeLegStates(self, coordinates, state, residual, R, span)
 
     def turns(self, coordinates: PlatformCoordinates) -> bool:
-        """Whether the end's rotation is given."""
+        """Return True if the end's rotation is given."""
         return self.end_link in coordinates.links
 
     @property
@@ -279,7 +279,7 @@ class IterativeLegStates(Value):
         return u.T, (M @ self._motions).transpose(1, 2, 0), self.residual <= CLOSED
 
     def wrenches(self) -> Array:
-        """What the leg forbids the platform's twists, (n, 6, D)."""
+        """Return the wrenches of the leg on the platform, (n, 6, D)."""
         return self._answers[2] @ self._motions
 
 

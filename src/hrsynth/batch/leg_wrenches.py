@@ -1,8 +1,8 @@
-"""What legs forbid a platform whose twists are not the same everywhere: each one force, in closed form.
+"""Constraint wrenches of legs on a platform whose twists change with the pose: each one force, in closed form.
 
-A leg holds a point C of the platform in a plane of the base or at a distance from a point of the base, or lets a plane
-of the platform pass a point of the base: a force along the plane's normal or from point to point. It is read from the
-leg's joints and counts only if it is what the leg forbids at all configurations.
+A leg keeps a point C of the platform in a plane of the base or at a distance from a point of the base, or a plane of
+the platform on a point of the base: a force along the plane's normal or from point to point. It is read from the leg's
+joints and counts only if it holds at all configurations.
 """
 
 from __future__ import annotations
@@ -42,13 +42,13 @@ class LegForce(Value):
         return ((R @ self.normal).T if self.turns else np.broadcast_to(self.normal[:, None], p.T.shape)), arm
 
     def rows(self, p: Array, R: Array, span: Array) -> Array:
-        """What it forbids of the twists ``span`` (6, D), of unit length, (D, n)."""
+        """Return the force on the twists ``span`` (6, D), of unit length, (D, n)."""
         force, arm = self.force(p, R)
         found = span.T @ np.concatenate([force, cross(arm, force, axis=-2)])
         return np.asarray(found / _size(found))
 
     def level(self, p: Array, R: Array) -> Array:
-        """What stays (n,), m: the tip's height or distance, or the place's height above the reference point."""
+        """Return the constant (m; n,): the tip's height or distance, or the reference point's height."""
         force, arm = self.force(p, R)
         height = arm if self.turns else arm + p.T - (0.0 if self.normal is not None else self.place[:, None])
         return np.asarray(np.einsum("in,in->n", force, height))
@@ -80,8 +80,8 @@ def holds_of_leg(
 
 
 def _candidates(mechanism: Mechanism, leg: Leg, coordinates: PlatformCoordinates) -> Iterator[LegForce]:
-    """Of the leg's joints on the base and on the platform: all pairs of centres, all axes, and what is normal to them
-    where the platform turns about one axis."""
+    """Yield candidates from the leg's joints on the base and on the platform: all pairs of centres, all axes, and the
+    normals to them where the platform rotates about one axis."""
     body = coordinates.links.get(leg.platform_link)
     if body is None:
         return

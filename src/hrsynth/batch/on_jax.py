@@ -18,7 +18,7 @@ from .tape import UFUNCS, Symbol
 FEWEST, MOST = 1024, 1 << 20
 """Poses that are worked on together: powers of two in between, for each of which XLA compiles once."""
 Table = dict[int, Any]
-"""What stands at each place that is filled, (n,)."""
+"""Values at each filled place, (n,)."""
 
 
 def run(
@@ -86,7 +86,7 @@ def _repeat_step(
 
 
 def _store(kernel: Kernel, table: Table, numbers: Any) -> Table:
-    """What a kernel puts at its places."""
+    """Return the table with a kernel's results."""
     import jax.numpy as jnp
 
     values: dict[int, Any] = {}

@@ -1,9 +1,9 @@
-"""How the links of a platform go with its pose: what is fixed in each as a function of position and rotation alone.
+"""Poses of the links of a platform as functions of its position and rotation alone.
 
 Poses are given as the platform's reference point p and its rotation R. A point of a link that turns with the platform
 is p + R b; one of a link that only translates (a half of an articulated platform) is p + R b + c: the law is fitted to
-closed configurations and holds at all of them, or the link is not placed. A link that slides on the platform has one
-more number, how far; it is as it would be if it went with the platform and the platform stood so much farther.
+closed configurations and holds at all of them, or the link has no such pose. A link that slides on the platform has one
+more number, its displacement: it moves with the platform displaced so far.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class PlatformLink(Value):
         return PlatformPoint(True, b, c)
 
     def poses(self, p: Array, R: Array) -> Array:
-        """Its poses (n, 4, 4) at poses (n, 3), (n, 3, 3) of the platform."""
+        """Return the link's poses (n, 4, 4) at poses (n, 3), (n, 3, 3) of the platform."""
         X = np.tile(np.eye(4), (len(p), 1, 1))
         X[:, :3, 3] = p + R @ self.b + self.c
         X[:, :3, :3] = R @ self.Q if self.turns else self.Q
@@ -50,15 +50,15 @@ class PlatformLink(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SlidingLink(Value):
-    """A link that a P joint of this name carries on the platform: as ``body`` says at p + s R ``along``, s the joint's
-    coordinate (m; zero at the zero configuration)."""
+    """Link that a P joint of this name carries on the platform: at the pose that ``body`` has at p + s R ``along``, s
+    the joint's coordinate (m; zero at the zero configuration)."""
 
     joint: str
     along: Array
     body: PlatformLink
 
     def moved(self, X: Array, s: Array) -> Array:
-        """The platform's poses X (n, 4, 4), farther by as much as the link has slid (n,)."""
+        """Return the platform's poses X (n, 4, 4), displaced by the link's displacement (n,)."""
         return _farther(X, s[:, None] * (X[:, :3, :3] @ self.along))
 
 
@@ -67,8 +67,8 @@ class PlatformCoordinates(Value):
     """The platform: its reference point, a basis of its twists, the links that go with it.
 
     ``translations`` (3, k) and ``rotations`` (3, m) are orthonormal: the twist with coordinates (x, y) is the velocity
-    ``translations`` x of the point and the angular velocity ``rotations`` y. Where not every one of these twists is one
-    of the platform's (``constant`` is false), the legs say at each pose which are.
+    ``translations`` x of the point and the angular velocity ``rotations`` y. If not every one of these twists is one
+    of the platform's (``constant`` is false), the legs determine at each pose which are.
     """
 
     link: str
@@ -80,7 +80,7 @@ class PlatformCoordinates(Value):
 
     @property
     def constant(self) -> bool:
-        """Whether the platform has the same twists at every pose."""
+        """Return True if the platform has the same twists at every pose."""
         return int(self.translations.shape[1] + self.rotations.shape[1]) == self.dof
 
     @property
@@ -97,7 +97,7 @@ class PlatformCoordinates(Value):
 
     @classmethod
     def of(cls, motion: PlatformMotion, frames: Frames, names: Sequence[str], length: float) -> PlatformCoordinates:
-        """Those of a platform, and those of the links ``names`` that go with it."""
+        """Determine the coordinates of a platform, and of the links ``names`` that move with it."""
         X = frames[motion.link]
         p = X[:, :3, 3] + X[:, :3, :3] @ motion.point
         found = {

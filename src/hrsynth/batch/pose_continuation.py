@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 def generic_motion(start: ClosedConfiguration, observation_model: ObservationModel) -> PlatformMotion:
-    """What the platform generically does, from a few random configurations."""
+    """Return the generic motion of the platform, from a few random configurations."""
     return PlatformMotion.of(random_walk(start, 4, steps=2), observation_model)
 
 
@@ -64,26 +64,26 @@ def reach(
 def dependence(
     start: ClosedConfiguration, motion: PlatformMotion, goal: PoseTask, what: str, stuck: bool = False
 ) -> str | None:
-    """That parts of wanted poses (``what``) depend on each other, at zero and elsewhere, or where the way is ``stuck``
-    at zero, there; None where they do not. A part alone depends on nothing: the platform does not change it."""
+    """Return a text on parts of desired poses (``what``) that depend on each other, at zero and elsewhere, or where the
+    path is ``stuck`` at zero, there; None if they do not. A part alone depends on nothing: the platform does not change
+    it."""
     rows = goal.error_and_jacobian(start.model, start.q)[1]
     if not are_dependent(start, rows):
         return None
     there = any(are_dependent(at, goal.error_and_jacobian(at.model, at.q)[1]) for at in _aside(start)[-1:])
     if not (there or stuck):
         return None
-    freedoms = "1 freedom" if motion.dof == 1 else f"{motion.dof} freedoms"
     where = "at zero and at a random configuration" if there else "at zero, to first order,"
     why = (
         "none of them changes this part"
         if len(rows) == 1
         else f"parts of {what} depend on each other" + ": give fewer" * there
     )
-    return f"the platform has {freedoms}, and {where} {why}"
+    return f"the platform has {motion.dof} dof, and {where} {why}"
 
 
 def grid_dependence(start: ClosedConfiguration, motion: PlatformMotion, grid: Grid) -> str | None:
-    """What :func:`dependence` says of the poses of a grid."""
+    """Return the text of :func:`dependence` for the poses of a grid."""
     goal = motion.goal(next(iter(grid.poses_at([(0,) * grid.ndim]))), start.model.mechanism.name)
     return dependence(start, motion, goal, "these poses")
 
@@ -97,8 +97,9 @@ def _aside(start: ClosedConfiguration) -> list[ClosedConfiguration]:
 
 
 def _origins(start: ClosedConfiguration, motion: PlatformMotion, goal: PoseTask) -> list[ClosedConfiguration]:
-    """Where ways to goals with the parts of this one may begin besides ``start``: aside, if the platform changes fewer
-    of these parts at ``start`` than there, though it has all its freedoms (a turn that two others make together)."""
+    """Return the configurations from which paths to goals with these parts may start besides ``start``: beside it, if
+    the platform changes fewer of these parts at ``start`` than there, though it has all its dof (a rotation that two
+    others make together)."""
     rows = goal.error_and_jacobian(start.model, start.q)[1]
     if not are_dependent(start, rows):
         return []
@@ -112,7 +113,7 @@ def _origins(start: ClosedConfiguration, motion: PlatformMotion, goal: PoseTask)
 
 
 def _parts_changed(at: ClosedConfiguration, rows: Array) -> int:
-    """How many of the parts with Jacobian ``rows`` (k, nv) change one by one, with closed loops."""
+    """Return the number of parts with Jacobian ``rows`` (k, nv) that change independently, with closed loops."""
     return range_basis(rows @ at.kernel()[0], 1.0)[1].value
 
 
@@ -123,8 +124,8 @@ def _lead_from(
     goal: PoseTask,
     halvings: int = HALVINGS,
 ) -> tuple[ClosedConfiguration, float]:
-    """Where small steps lead to a goal, as :func:`.steps.track`: from ``here``, or else from the two ``beside`` that
-    are nearest to the goal."""
+    """Return the end of small steps to a goal, as :func:`.steps.track`: from ``here``, or else from the two ``beside``
+    that are nearest to the goal."""
     led = track(here, motion, goal, halvings)
     if led[1] == 1:
         return led
@@ -135,7 +136,7 @@ def _lead_from(
 
 
 def _lost_rank(start: ClosedConfiguration, here: ClosedConfiguration) -> str | None:
-    """That the way ended where the loops lose rank, if it did."""
+    """Return a text if the path ended where the loops lose rank."""
     kept, left = start.strengths, here.strengths
     if len(left) == len(kept) and (not len(kept) or left[-1] > EASY_RANK * kept[-1]):
         return None
@@ -143,7 +144,7 @@ def _lost_rank(start: ClosedConfiguration, here: ClosedConfiguration) -> str | N
 
 
 def _has_arrived(at: ClosedConfiguration, goal: PoseTask) -> bool:
-    """Whether a configuration is at the wanted pose, by its matrix, and no wrist is beyond its interval."""
+    """Return True if a configuration is at the desired pose, by its matrix, and no tilt limit is exceeded."""
     return goal.is_met(at.pose(goal.link), AS_PRINTED * max(1.0, at.model.length)) and not wrists_beyond(at.model, at.q)
 
 

@@ -31,20 +31,20 @@ from .tape import LANES, Store, Symbol, Tape
 CHUNK = 4096
 """Poses that are worked on together, so that their arrays stay in the cache."""
 Compiled = bool | Literal["numba", "jax"]
-"""By what a program is compiled: True is numba, False nothing."""
+"""Compiler of a program: True is numba, False nothing."""
 Formula = Callable[..., Mapping[str, Components]]
-"""From the components of what it reads to those of what it makes, by name."""
+"""Function from the components of its inputs to those of its outputs, by name."""
 
 
 @dataclass(eq=False)
 class Program:
-    """What is traced so far; the first ``inputs`` places are given at each pose."""
+    """Traced program; the first ``inputs`` places are given at each pose."""
 
     inputs: int
     places: dict[str, list[Any]]
     count: int
     section: Section = field(default_factory=lambda: Section(None))
-    """Where formulas are added."""
+    """Section to which formulas are added."""
     sections: list[Section] = field(default_factory=list)
     numbers: list[float] = field(default_factory=list)
     tape: Tape | None = None
@@ -127,7 +127,7 @@ class Program:
         return found
 
     def is_compiled(self, names: Sequence[str]) -> bool:
-        """Whether numba has compiled what makes these names, in this run or in an earlier one."""
+        """Return True if numba has compiled the kernels of these names, in this run or in an earlier one."""
         file = _file_of(self.text(self._outputs(names)))
         return any(file.parent.glob(f"__pycache__/{file.stem}.sweep*.nbi"))
 
@@ -232,7 +232,7 @@ class Program:
 
 
 def threads() -> int:
-    """The cores that the process may use, or fewer if NUMBA_NUM_THREADS says so."""
+    """Return the number of cores that the process may use, or the smaller one of NUMBA_NUM_THREADS."""
     from numba import config
 
     return int(vars(config)["NUMBA_NUM_THREADS"])
@@ -299,7 +299,7 @@ def compiled_module(text: str) -> Any:
 
 
 def _file_of(text: str) -> Path:
-    """Where the text of a module is kept."""
+    """Return the path of a module's text."""
     return _home() / f"kernels_{hashlib.sha256(text.encode()).hexdigest()[:24]}.py"
 
 

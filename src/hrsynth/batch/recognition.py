@@ -44,7 +44,7 @@ def recognise_leg(
 
 
 def _holds(form: ClosedFormLeg, p: Array, R: Array, u: Array) -> bool:
-    """Whether a form gives the directions u (m, 3) at poses, in one of its modes, at the first in its own."""
+    """Return True if a form gives the directions u (m, 3) at poses, in one of its modes, at the first in its own."""
     with np.errstate(invalid="ignore", divide="ignore"):
         if not isinstance(form, OnCrank | OnRail):
             found, reached = form.direction(p, R)

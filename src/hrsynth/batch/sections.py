@@ -1,5 +1,5 @@
-"""What a program is made of: kernels, straight-line code on the places of a table, loops of them, and sections that run
-where a flag is positive; each run in NumPy."""
+"""Parts of a program: kernels, straight-line code on the places of a table, loops of them, and sections that run where
+a flag is positive; each run in NumPy."""
 
 from __future__ import annotations
 

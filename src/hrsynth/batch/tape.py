@@ -119,12 +119,12 @@ class Tape:
     known: dict[tuple[Any, ...], Symbol] = field(default_factory=dict)
 
     def make(self, name: str, *arguments: Any) -> Symbol:
-        """An operation on symbols and constants, found again where it is there already."""
+        """Return an operation on symbols and constants; equal ones are shared."""
         operation = (name, *(each.number if isinstance(each, Symbol) else float(each) for each in arguments))
         return self._find(operation)
 
     def load(self, place: int) -> Symbol:
-        """What stands at a place."""
+        """Return the symbol at a place."""
         return self._find(("load", place))
 
     def place(self, value: Any) -> int | None:
@@ -153,7 +153,7 @@ class Tape:
         return [each for each in operation[1:] if isinstance(each, int)]
 
     def are_constant(self) -> list[bool]:
-        """Which operations are on the robot's numbers alone: the same at all poses."""
+        """Return True for operations on the robot's numbers alone: the same at all poses."""
         found: list[bool] = []
         for operation in self.code:
             found.append(operation[0] != "load" and all(found[each] for each in self.arguments(operation)))

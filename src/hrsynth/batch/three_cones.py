@@ -1,15 +1,15 @@
 """Bounds of the largest error for three cones and more.
 
-E(w) = Σ √(wᵀ B_i w) is sought over unit w. Any w gives a lower bound; the ascent w ← Σ B_i w / √(wᵀ B_i w), normalised,
-never makes E smaller (E is convex). Any weights t give the upper bound (1) of ``cones``, √λmax(Σ B_i / t_i). The least
-of the upper bounds is the maximum of the concave
+E(w) = Σ √(wᵀ B_i w) is sought over unit w. Any w gives a lower bound; the ascent w ← Σ B_i w / √(wᵀ B_i w),
+normalised, never makes E smaller (E is convex). Any weights t give the upper bound (1) of ``cones``, √λmax(Σ B_i /
+t_i). The least of the upper bounds is the maximum of the concave
 
     F(Z) = Σ √tr(B_i Z)   over Z ⪰ 0 of trace one,                                                               (2)
 
 of which E is the part Z = w wᵀ of rank one. So each round takes the weights t_i = √tr(B_i Z) / F(Z), at which (1) is
-the best that this Z tells, and goes from Z towards w wᵀ, w the eigenvector of (1), which is where F rises most (Frank
-and Wolfe), as far as F rises. It ends where the bounds meet; where the maximum of (2) has a higher rank than one they
-do not, and both are told: the truth lies between.
+the best for this Z, and goes from Z towards w wᵀ, w the eigenvector of (1), which is where F rises most (Frank and
+Wolfe), as far as F rises. It ends where the bounds meet; where the maximum of (2) has a higher rank than one they do
+not, and both are reported: the maximum lies between.
 """
 
 from __future__ import annotations

@@ -20,10 +20,10 @@ VERDICTS = {
         "FAILED",
         r"Type [123] singularity",
         "constraint singularity",
-        "boundary",
+        "limit reached",
         "local minimum",
         "antipodal",
-        "lost from sight",
+        "out of view",
     ),
 }
 """Words that end a question well, not wholly, badly; they stand first in their row, or as a cell of a table."""

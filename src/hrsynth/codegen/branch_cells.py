@@ -21,8 +21,8 @@ from ..tolerances import GENERATED_CLOSED
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TubeCell(Value):
-    """Where motors are between ``lower`` and ``upper`` (m,), the loops have one closure with
-    |x − middle − slopes (q − (lower + upper) / 2)| ≤ radius, (p,); slopes (p, m)."""
+    """Cell of motor values between ``lower`` and ``upper`` (m,) in which the loops have one closure with |x − middle −
+    slopes (q − (lower + upper) / 2)| ≤ radius, (p,); slopes (p, m)."""
 
     lower: Array
     upper: Array
@@ -48,11 +48,11 @@ class TubePart(Value):
 
     @property
     def exact(self) -> bool:
-        """Whether these are as many as the unknowns: the closure is their zero."""
+        """Return True if these are as many as the unknowns: the closure is their zero."""
         return len(self.solved) == len(self.unknowns)
 
     def ordered(self, places: Sequence[int]) -> TubePart:
-        """The same with its unknowns in another order."""
+        """Return the same with its unknowns in another order."""
         own = list(places)
         return TubePart(
             self.driven,
@@ -115,11 +115,11 @@ class TubedBranch(Value):
         return tuple(i for i in range(len(self.system.coordinates)) if i not in {*self.motors, *self.passive})
 
     def unit(self, i: int) -> float:
-        """What counts as 1 of a coordinate: the characteristic length, or a radian."""
+        """Return the unit of a coordinate: the characteristic length, or a radian."""
         return self.system.mechanism.length if self.system.coordinates[i].slides else 1.0
 
     def unit_name(self, i: int) -> str:
-        """Its unit's name."""
+        """Return the name of its unit."""
         return "m" if self.system.coordinates[i].slides else "rad"
 
     @property
@@ -129,7 +129,7 @@ class TubedBranch(Value):
         return max(1.0, float(self.system.mechanism.length))
 
     def closing_tolerance(self, rows: Sequence[int]) -> Array:
-        """What equations, by their places among all, may be off where their loops count as closed."""
+        """Return the residuals of equations, by their indices among all, below which their loops count as closed."""
         units = [self.far if row.kind == "point" else 1.0 for loop in self.system.loops for row in loop.rows]
         units += [self.far if self.system.coordinates[gear.second].slides else 1.0 for gear in self.system.gears]
         return np.asarray(GENERATED_CLOSED * np.array(units)[list(rows)])
@@ -142,7 +142,7 @@ class TubedBranch(Value):
 
 
 def _reasons(part: BranchPart) -> str:
-    """Why nothing of a part is proved: each reason once, with the place that is nearest to zero."""
+    """Return the reasons for which nothing of a part is proved: each once, with the place nearest to zero."""
     nearest: dict[str, Array] = {}
     for each in sorted(part.toggles, key=lambda each: float(np.linalg.norm(each.q))):
         nearest.setdefault(each.reason, each.q)

@@ -57,7 +57,7 @@ def cell_tree(lower: Array, upper: Array, cells: Sequence[tuple[Array, Array]]) 
 
 
 def tree_depth(root: int, nodes: Sequence[Node]) -> int:
-    """How many nodes lie on the longest way from the root."""
+    """Return the number of nodes on the longest path from the root."""
     depth, level = 0, [root] if root >= 0 else []
     while level:
         depth, level = depth + 1, [each for at in level for each in nodes[at][2:] if each >= 0]

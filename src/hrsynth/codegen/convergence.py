@@ -1,4 +1,4 @@
-"""How many steps of Newton's method a generated program needs, and how far its answers can be off, proved cell by cell.
+"""Proved bounds, cell by cell: Newton steps that a generated program needs, and the error of its results.
 
 Let R be somewhat more than the radius of a cell's tube about x̃(q). With Y(q), of first order in the motors, about
 (D_xG)⁻¹, let |1 − Y D_xG| ≤ M and |Y D²_xG(·, v)| ≤ Q(v) in |x − x̃| ≤ R (componentwise, affine forms), let the program
@@ -11,8 +11,8 @@ Algorithms, 2002, theorem 9.5); F = |Y| ΔJ. Then
    (1 − M − F)⁻¹ (Q(b + e / 2) e + F e + |Y| δ) of x*, with Q(e / 2) where z = x, as long as this and e are at most
    R − a;
 3. from e = a the bounds of the steps follow one another, until those of the program's tests are met;
-4. where the program's last step was at most s, the answer is within (1 − M)⁻¹ (Q(r + s') s + F s + |Y| δ) of x*, s' its
-   step before and r = (1 − M)⁻¹ ((1 + M + F) s + |Y| δ) how far it was off before the last.
+4. where the program's last step was at most s, the result is within (1 − M)⁻¹ (Q(r + s') s + F s + |Y| δ) of x*, s' its
+   step before and r = (1 − M)⁻¹ ((1 + M + F) s + |Y| δ) its error before the last.
 """
 
 from __future__ import annotations
@@ -71,11 +71,11 @@ class BoundedCell(Value):
     alone: bool
 
     def good(self, units: Array) -> bool:
-        """Whether all is proved that is wanted."""
+        """Return True if everything required is proved."""
         return bool(self.steps and np.all(self.error <= GENERATED_ERROR * units))
 
     def is_of(self, parent: BoundedCell) -> bool:
-        """Whether it is proved that there is a closure in its tube, that of the cell of which this is a part."""
+        """Return True if it is proved that there is a closure in its tube, that of the cell of which this is a part."""
         cell, whole = self.cell, parent.cell
         off = (
             np.abs(cell.middle - whole.middle - whole.slopes @ (cell.centre - whole.centre))
@@ -92,7 +92,7 @@ class BoundedCell(Value):
 
     @property
     def divisible(self) -> bool:
-        """Whether it has not too many sides to halve them all."""
+        """Return True if it has few enough sides to halve them all."""
         return bool(2 ** len(self.cell.lower) <= MOST_PARTS)
 
     def split(self, loops: LoopPart, known: bool) -> _Parts:
@@ -171,7 +171,7 @@ def bounded_cells(
 
 @dataclass(frozen=True, eq=False)
 class _Code:
-    """What a program computes of a part: the solved equations, ``rows`` of its closure, with their derivatives."""
+    """Computation of a part by a program: the solved equations, ``rows`` of its closure, with their derivatives."""
 
     branch: TubedBranch
     part: TubePart
@@ -180,7 +180,7 @@ class _Code:
     closure: TracedFunction
     rows: list[int]
     closed: Array
-    """What the solved equations may be off where their loops count as closed."""
+    """Residuals of the solved equations below which their loops count as closed."""
 
     @property
     def solved(self) -> Sequence[LoopEquation]:
@@ -189,7 +189,7 @@ class _Code:
 
     @cached_property
     def units(self) -> Array:
-        """What counts as 1 of each unknown (p,)."""
+        """Units of the unknowns (p,)."""
         return np.array([self.branch.unit(i) for i in self.part.unknowns])
 
     def bound_parts(self, every: Sequence[_Parts]) -> Iterator[list[BoundedCell]]:
@@ -217,8 +217,8 @@ class _Code:
 
     @cached_property
     def growth(self) -> float:
-        """What is off of a matrix whose LU factors are taken, relative to its largest row sum (theorem 9.5): a row at
-        most doubles whenever another is taken from it, which happens where it can have an entry in the column."""
+        """Rounding error of LU factors, relative to the matrix's largest row sum (theorem 9.5): a row at most doubles
+        whenever another is subtracted from it, which happens where it can have an entry in the column."""
         p = len(self.rows)
         pattern = [
             {place[1] for array, place, _ in self.equations.stores if array == "J" and place[0] == i} for i in range(p)
@@ -299,7 +299,7 @@ def _bounds(code: _Code, cells: Sequence[TubeCell], known: Sequence[bool], wider
         outer = _inverse_bound(M + F)
 
         def step(e: Array, off: Array) -> Array:
-            """What is left of e after a step; ``off``: how far the matrix's place is from those between."""
+            """Return the error e after a step; ``off``: the distance of the matrix's place from those between."""
             return _times(outer, _times(_weigh(Q, off) + F, e) + noise) + rounding
 
         # 2, 3. one step after another, each with a second one by the same matrix; whether equations that are not solved
@@ -330,8 +330,8 @@ def _bounds(code: _Code, cells: Sequence[TubeCell], known: Sequence[bool], wider
 
 
 def _level(B: AffineForms, motors: int) -> tuple[Array, Array]:
-    """Of matrices B = 1 + Σ N_k ε_k + … (c, p, p), the first symbols those of the motors: P B with P = 1 − Σ N_k ε_k, a
-    bound of |P|, and one of |1 − P B|."""
+    """Return for matrices B = 1 + Σ N_k ε_k + … (c, p, p), the first symbols those of the motors: P B with P = 1 − Σ
+    N_k ε_k, a bound of |P|, and one of |1 − P B|."""
     p = B.r.shape[-1]
     v = np.zeros_like(B.v)
     v[0] = np.eye(p)
@@ -357,8 +357,8 @@ def _curvature_bounds(solved: Sequence[LoopEquation], trial: TubeTrial, radius: 
 
 
 def platform_error(branch: TubedBranch, ranges: Array, errors: Array, function: TracedFunction) -> tuple[float, float]:
-    """How far the platform's rotation (entries) and position (m) are from those at the closure, at most: ``ranges``
-    (2, p) of the unknowns, ``errors`` (p,) of them."""
+    """Return the largest difference of the platform's rotation (entries) and position (m) from those at the closure:
+    ``ranges`` (2, p) of the unknowns, ``errors`` (p,) of them."""
     q = [RoundedNumber.between(low, high) for low, high in zip(branch.lower, branch.upper, strict=True)]
     x = [RoundedNumber.between(low, high, off) for low, high, off in zip(*ranges, errors, strict=True)]
     made = round_function(function, q, x)
@@ -379,7 +379,7 @@ def _weigh(Q: Array, v: Array) -> Array:
 
 
 def _within(e: Array, limit: Array) -> NDArray[np.bool_]:
-    """Which rows (c,) of a bound (c, p) are at most a limit."""
+    """Return True for rows (c,) of a bound (c, p) that are at most a limit."""
     return np.asarray(np.all(e * BOUND_ROUNDING <= limit, axis=-1))
 
 

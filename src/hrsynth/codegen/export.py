@@ -27,7 +27,7 @@ from .source import ProvedBounds, Source
 
 
 class ExportedPart(NamedTuple):
-    """Motors with the passive coordinates that they alone decide: how much of the box is proved, and a box that is."""
+    """Motors with the passive coordinates that they determine: proved fraction of the box, and a proved box."""
 
     motors: tuple[str, ...]
     volume_fraction: float
@@ -35,7 +35,7 @@ class ExportedPart(NamedTuple):
 
 
 class FreeMotor(NamedTuple):
-    """A motor in no loop, and the interval in which the program answers (m, rad)."""
+    """Motor in no loop, and the interval (m, rad) in which the program gives results."""
 
     motor: str
     lower: float
@@ -44,20 +44,20 @@ class FreeMotor(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ExportedCode(Result, shown_as="export"):
-    """A program, its language, and the proof on which it rests; ``legs`` are those whose directions it gives."""
+    """Program, its language, and the proof behind it; ``legs`` are those whose directions it gives."""
 
     proof: BranchProof
     lang: Annotated[str, Literal["c++", "numpy"]]
     legs: Recorded[tuple[str, ...]]
     closed: bool
-    """Whether the motors of a pose are found in closed form."""
+    """Flag: the motors of a pose are computed in closed form."""
     bounds: ProvedBounds | None
-    """Newton's steps that are enough, and how far an answer is off at most (proved); None where a cell has no bound."""
+    """Newton steps that are enough, and the largest error of a result (proved); None if a cell has no bound."""
     cells: Recorded[int]
-    """How many cells the program holds."""
+    """Number of cells in the program."""
     code: str
     free: Recorded[tuple[FreeMotor, ...]] = ()
-    """Motors in no loop, with the interval (m, rad) in which the program answers."""
+    """Motors in no loop, with the interval (m, rad) in which the program gives results."""
 
     @property
     def robot(self) -> Any:
@@ -66,23 +66,23 @@ class ExportedCode(Result, shown_as="export"):
 
     @property
     def setup(self) -> Any:
-        """What is compared besides the record."""
+        """Setup compared besides the record."""
         return self.proof.robot
 
     def headline(self) -> str:
-        """The robot, and how much is proved."""
+        """Return the robot and the proved fraction."""
         return f"{self.lang} of {self.proof.headline()}"
 
     motors = Shown(list[str], lambda self: self.proof.motors)
     passive = Shown(list[str], lambda self: self.proof.passive)
-    fixed = Shown(list[str], lambda self: self.proof.held)
+    fixed = Shown(list[str], lambda self: self.proof.fixed)
     injective_box = Shown(Table | None, lambda self: self.proof.injective_box, BACK)
     limits = Shown(list[BranchLimit], lambda self: self.proof.limits)
 
     @property
     @recorded()
     def inverse(self) -> Literal["closed form", "Newton's method"]:
-        """How the program finds the motors of a pose."""
+        """Method by which the program computes the motors of a pose."""
         return "closed form" if self.closed else "Newton's method"
 
     @property
@@ -94,13 +94,13 @@ class ExportedCode(Result, shown_as="export"):
     @property
     @recorded()
     def error(self) -> float | None:
-        """How far an answer is off at most (rad, 1, characteristic lengths; proved), or null."""
+        """Largest error of a result (rad, 1, characteristic lengths; proved), or null."""
         return self.bounds.error if self.bounds else None
 
     @property
     @recorded()
     def parts(self) -> list[ExportedPart]:
-        """The parts of the proof, without their cells."""
+        """Parts of the proof, without their cells."""
         return [ExportedPart(each.motors, each.volume_fraction, each.proved) for each in self.proof.parts]
 
 
@@ -123,27 +123,55 @@ def export(
     camera: CameraLike = None,
     max_cells: Cells = BRANCH_CELLS,
 ) -> ExportedCode:
-    """Code for a controller: motors to passive joints and platform, Jacobians, and back, on the branch of the zero
-    configuration.
+    """Code for a controller: forward and inverse kinematics and Jacobians, on the branch of the zero configuration.
 
-    A program for a controller, in C++ (one header, C++17, Eigen) or NumPy (one module): from the motors' coordinates
-    it computes the passive joints and the platform's pose on the branch of the zero configuration, their Jacobians, the
-    motors for a pose, and the interaction matrix of the watched directions (``observe``, ``camera`` as for ``derive``).
+    The program computes the passive joints and the platform's pose from the motors' coordinates, their Jacobians, the
+    motors for a pose, and the interaction matrix of the observed directions.
 
-    It answers where :func:`.branch` proves the branch (``box``, ``max_cells`` as there) and refuses elsewhere. The same
-    robot gives the same text on one machine. Raises what ``branch`` raises, ``NothingProved``, ``BadRequest`` for
-    another language.
+    Parameters
+    ----------
+    robot
+        Robot, file or name.
+    lang
+        ``c++`` (one header, C++17, Eigen) or ``numpy`` (one module).
+    box
+        Interval of each motor (m, rad), as for ``branch``.
+    observe, camera
+        Observed directions, as for ``derive``.
+    max_cells
+        Largest number of cells, as for ``branch``.
 
+    Returns
+    -------
+    ExportedCode
+        Code, proof and proved bounds.
+
+    Raises
+    ------
+    BadRequest
+        Unknown language or name, or an observation that is not a direction.
+    NothingProved
+        No cell of the branch is proved.
+
+    Notes
+    -----
+    The program returns results where :func:`.branch` proves the branch and refuses other motor values. The same robot
+    gives the same text on one machine. Equations: docs/pages/proofs.md.
+
+    Examples
+    --------
     >>> hrsynth.export("rrrrr_m1", "numpy", {"shoulder_1": (-0.05, 0.05), "shoulder_2": (-0.05, 0.05)}).lang
     'numpy'
     """
     if lang not in TEMPLATES:
-        raise BadRequest("language", lang, tuple(TEMPLATES))
+        raise BadRequest("--lang", lang, tuple(TEMPLATES))
     given = as_robot(robot)
     watched = _watched_directions(given, observe, camera)
     proof = branch(given, box, max_cells=max_cells)
     if not proof.parts:
-        raise BadRequest(f"{proof.robot.name}: loops that its motors move", 0, "one or more")
+        raise BadRequest(
+            f"{proof.robot.name}: the motors move no kinematic loop", remedy="Choose a robot with kinematic loops."
+        )
     report("code")
     branch_ = TubedBranch.of(proof, parsed_box(box))
     moved = proof.robot not in (given, getattr(given, "robot", None))
@@ -162,8 +190,8 @@ def export(
 
 
 def _watched_directions(robot: Any, observe: LegsLike, camera: CameraLike) -> tuple[Direction, ...]:
-    """The watched directions that are seen from the base; by default none where a robot has no legs to watch. Raises
-    ``BadRequest`` where something else is observed."""
+    """Return the observed directions, as seen from the base; by default none if a robot has no observable legs. Raises
+    ``BadRequest`` if something else is observed."""
     try:
         observed = ObservedRobot.of(robot, observe, camera)
     except HrsynthError:
@@ -174,7 +202,7 @@ def _watched_directions(robot: Any, observe: LegsLike, camera: CameraLike) -> tu
     links, reference = observed.robot.links, observed.normal.mechanism.reference
     if reference != observed.robot.base:
         if camera is not None:
-            raise BadRequest("code for directions seen from a moving link", camera, "directions seen from the base")
+            raise BadRequest(f"--camera {camera}: the camera moves", remedy="Observe the directions from the base.")
         return ()
     return tuple(
         each
@@ -184,7 +212,7 @@ def _watched_directions(robot: Any, observe: LegsLike, camera: CameraLike) -> tu
 
 
 def _free(proof: BranchProof, branch_: TubedBranch) -> tuple[FreeMotor, ...]:
-    """The motors in no loop, and where the program answers."""
+    """Return the motors in no loop, with their intervals."""
     moving = {name for part in proof.parts for name in part.motors}
     return tuple(
         FreeMotor(name, float(low), float(high))
@@ -196,7 +224,7 @@ def _free(proof: BranchProof, branch_: TubedBranch) -> tuple[FreeMotor, ...]:
 def _describe_program(
     proof: BranchProof, source: Source, lang: str, box: BoxLike | None, max_cells: int, camera: tuple[str, ...]
 ) -> list[str]:
-    """What the program says of itself."""
+    """Return the header of the program: robot, ranges, what is proved and what is checked."""
     from ..version import __version__
 
     robot, branch_ = proof.robot, source.branch
@@ -220,7 +248,7 @@ def _describe_program(
     lines = [
         f"Made by hrsynth {__version__}: {shlex.join(words)}",
         *([f"SHA-256 of {file}: {robot.sha256}"] if robot.sha256 else []),
-        f"Robot {robot.name}: {len(proof.motors)} motors, {len(proof.passive)} passive coordinates; idle, held"
+        f"Robot {robot.name}: {len(proof.motors)} motors, {len(proof.passive)} passive coordinates; internal, fixed"
         f"{'' if any(proof.fixed_at.values()) else ' at 0'}: {', '.join(held) or 'none'}.",
         "Motors in order; values outside these ranges are refused:",
     ]
@@ -231,16 +259,16 @@ def _describe_program(
     for part in proof.parts:
         low, high = (each.tolist() for each in part.proved)
         lines.append(
-            f"{part.in_cells}, {100 * part.volume_fraction:.4g} % of the box that was asked for; what no cell "
-            "covers is refused. Fully covered:"
+            f"{part.in_cells}, {100 * part.volume_fraction:.4g} % of the requested box; motor values outside "
+            "the cells are refused. Fully covered:"
         )
         lines += [f"  {name}: {a!r} to {b!r}" for name, a, b in zip(part.motors, low, high, strict=True)]
     free = [name for name, _, _ in _free(proof, branch_)]
-    lines += [f"Motors in no loop, on which nothing but poses depends: {', '.join(free)}."] * bool(free)
+    lines += [f"Motors in no loop, which only poses depend on: {', '.join(free)}."] * bool(free)
     lines += [
-        f"An answer is given where the last step of Newton's method is at most {GENERATED_LAST_STEP:g} (rad, or "
-        f"of {robot.length:.6g} m: how",
-        "far the centres of the joints that the file has are from their middle on average), all loops are",
+        f"A result is given if the last step of Newton's method is at most {GENERATED_LAST_STEP:g} (rad, or "
+        f"of {robot.length:.6g} m,",
+        "the characteristic length: mean distance of the joint centres of the file from their mean), all loops are",
         f"closed to {GENERATED_CLOSED:g} (cosines, or of {branch_.far:.6g} m), and the joints are in the cell's "
         "tube, in which the loops have one closure (proved).",
         *_bounds(source),
@@ -253,23 +281,22 @@ def _describe_program(
         if joint.name in used and joint.offset is not None and joint.offset.ndim > 1
     ]:
         lines.append(
-            "Balls, planar and floating joints that count from the zero configuration, not the file's zero: "
+            "Spherical, planar and floating joints with coordinates from the zero configuration, not the file's zero: "
             f"{', '.join(loose)}"
         )
     lines += [f"Limits of joints without a motor, {each}" for each in proof.limits_in_words()]
-    lines += [f"Limit of a motor that the box passes: {each}" for each in proof.motors_beyond()]
+    lines += [f"Limit of a motor that the box exceeds: {each}" for each in proof.motors_beyond()]
     return lines
 
 
 def _bounds(source: Source) -> list[str]:
-    """What is proved of Newton's method in it."""
+    """Return the proved bounds of Newton's method in it."""
     if source.bounds is None:
-        return ["How many steps are enough, and how far answers can be off, is not proved in all cells."]
+        return ["The number of steps and the error of results is not proved in all cells."]
     bounds = source.bounds
     return [
-        f"{bounds.steps} steps of Newton's method are enough in each part, and an answer is within "
+        f"{bounds.steps} steps of Newton's method are enough in each part, and a result is within "
         f"{bounds.joints:.2g} (rad, or of that length) of the",
-        f"closure (the joints that are solved for), the platform within {bounds.rotation:.2g} and "
-        f"{bounds.position:.2g}:",
+        f"closure (the joints solved for), the platform within {bounds.rotation:.2g} and {bounds.position:.2g}:",
         "proved, rounding in double precision included.",
-    ] + [f"Whether {bounds.more} is checked at run time."] * (bounds.others > 0)
+    ] + [f"At run time the program checks that {bounds.more}."] * (bounds.others > 0)

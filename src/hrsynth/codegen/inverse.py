@@ -1,4 +1,4 @@
-"""The motors of a pose in closed form: what each leg carries (:mod:`..closed_forms`) tells its motor's coordinate."""
+"""Motors of a pose in closed form: what each leg carries (:mod:`..closed_forms`) determines its motor's coordinate."""
 
 from __future__ import annotations
 
@@ -44,10 +44,11 @@ class LegMotor(Value):
     point: Array
     """The platform's reference point in its own frame: the form takes its place and the rotation."""
     zero: Any
-    """What is read at the zero configuration."""
+    """Value at the zero configuration."""
 
     def read(self, position: Components, R: Components) -> tuple[Any, Any]:
-        """Reach margin, and the vector or length that tells the coordinate, at a pose of the platform's frame."""
+        """Return the reach margin, and the vector or length that determines the coordinate, at a pose of the platform's
+        frame."""
         form, p = self.form, plus(position, transform_vector(R, self.point))
         tip = plus(plus(p if form.tip.follows else [0.0] * 3, transform_vector(R, form.tip.turned)), form.tip.constant)
         margin: Any = 1.0
@@ -153,7 +154,7 @@ def _samples(proof: BranchProof, branch: TubedBranch) -> tuple[Array, Array]:
 def _forms(
     observed: ObservedRobot, batch: Batch, mechanism: Mechanism, coordinate: TreeCoordinate
 ) -> Iterator[tuple[ClosedFormLeg, str]]:
-    """Forms that may tell a coordinate, and what of them is read."""
+    """Yield forms that may determine a coordinate, and the part of them that is read."""
     motor = coordinate.joint
     joint = mechanism.joints[motor]
     if mechanism.base in joint.links:

@@ -43,17 +43,17 @@ TAKEN = frozenset(
     Status UPPER forward inverse jacobians unique""",
     )
 )
-"""Keywords of C++17, names that something else has where headers are included, macros, and the header's own names
-(ambiguous where the namespace is used)."""
+"""Keywords of C++17, names from included headers, macros, and the header's own names (ambiguous where the namespace is
+used)."""
 RESERVED = re.compile(
     r"[a-z]\w*_t|(CHAR|CLOCK|DBL|EIGEN|FE|FLT|FP|INT\d*|LC|LONG|M|SEEK|SHRT|SIZE|UINT\d*)_[A-Z0-9_]+"
     r"|(pthread|sched|posix|fmaximum|fminimum)_\w+|\w+_unlocked|__\w+__|_[A-Z]\w*"
 )
-"""Types of the C library, its macros and families of functions, and what is the compiler's own (``__linux__``)."""
+"""Types, macros and function families of the C library, and names of the compiler (``__linux__``)."""
 
 
 def namespace(name: str) -> str:
-    """The name of a robot as a namespace of C++."""
+    """Return the name of a robot as a namespace of C++."""
     found = re.sub(r"[^0-9A-Za-z_]|^(?=\d)", "_", name) or "robot"
     taken = found in TAKEN or found in _c_names() or RESERVED.fullmatch(found)
     return f"{found}_" if taken else found
@@ -61,26 +61,26 @@ def namespace(name: str) -> str:
 
 @cache
 def _c_names() -> frozenset[str]:
-    """What the C library calls its functions."""
+    """Return the names of the C library's functions."""
     text = Path(__file__).with_name("c_names.toml").read_text(encoding="utf-8")
     return frozenset(tomllib.loads(text)["names"].split())
 
 
 def _comment(text: str) -> str:
-    """A text as it can stand in a comment: names of a file end none, continue none, and choose no encoding."""
+    """Return a text that is safe in a comment: it neither ends nor continues it, and selects no encoding."""
     line = "".join(each if each.isprintable() and each != "\\" else "_" for each in text)
     return re.sub(r"coding(?=[:=])", "coding ", line)
 
 
 def _unused_arguments(arguments: str, function: TracedFunction) -> str:
-    """The arguments of a function of C++ that it may not use, as they stand after ``(void)``."""
+    """Return the arguments that a C++ function may not use, as written after ``(void)``."""
     stored = {array for array, _, _ in function.stores}
     names = re.findall(r"& (\w+)", arguments)
     return ", (void)".join(name for name in names if name not in stored)
 
 
 def program(source: Source, language: str, told: Sequence[str]) -> str:
-    """The program in a language, with lines ``told`` at its head; the same each time."""
+    """Render the program in a language, with header lines ``told``; deterministic."""
     branch, mechanism = source.branch, source.branch.system.mechanism
     arguments = "const Motors& q, const Unknowns& x, "
     functions = [("platform", f"{arguments}Eigen::Matrix3d& R, Eigen::Vector3d& p", source.platform)]

@@ -1,4 +1,4 @@
-"""What the arithmetic of a program makes of its formulas: bounds of its numbers, and of their errors, for many boxes.
+"""Rounding in a program's formulas: bounds of its numbers, and of their errors, for many boxes.
 
 Every operation gives its exact result but for half a unit in the last place, sines and cosines but for four of them
 (running errors: N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2002, section 3.3). An operation that a
@@ -39,7 +39,7 @@ class RoundedNumber:
 
     @property
     def size(self) -> Array:
-        """What is computed is at most that large."""
+        """Bound of the computed number."""
         return np.maximum(np.abs(self.low), np.abs(self.high)) + self.error
 
     def __neg__(self) -> RoundedNumber:
@@ -83,7 +83,7 @@ class RoundedNumber:
 def round_function(
     function: TracedFunction, q: Sequence[RoundedNumber], x: Sequence[RoundedNumber]
 ) -> Mapping[tuple[str, Place], RoundedNumber]:
-    """What a function of equations stores, at inputs between bounds."""
+    """Return bounds of the numbers that a function of equations stores, at inputs between bounds."""
     names: dict[str, Any] = {"q": q, "x": x, "sin": RoundedNumber.sin, "cos": RoundedNumber.cos, "__builtins__": {}}
     exec("\n".join(f"{name} = {text}" for name, text in function.statements), names)
     return {

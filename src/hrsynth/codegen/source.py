@@ -1,4 +1,4 @@
-"""What the text of a program is made of, for all languages: the parts of a branch with their formulas and cells."""
+"""Contents of a program, for all languages: the parts of a branch with their formulas and cells."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ class SourcePart(Value):
     rows: tuple[int, ...]
     """The places of G among E."""
     count: int
-    """How many equations there are in all."""
+    """Number of equations in all."""
     closed: tuple[float, ...]
-    """What each of them may be off in an answer."""
+    """Tolerance of each of them in a result."""
     root: int
     nodes: tuple[Node, ...]
     depth: int
-    """Of the tree."""
+    """Root of the tree."""
     cells: tuple[tuple[tuple[float, ...], ...], ...]
     """Centre, x there, slopes row by row, radius."""
     units: tuple[float, ...]
@@ -59,12 +59,12 @@ class ProvedBounds:
 
     @property
     def error(self) -> float:
-        """The largest of the three."""
+        """Largest of the three."""
         return max(self.joints, self.rotation, self.position)
 
     @property
     def more(self) -> str:
-        """What is tested, in words."""
+        """Further tests, in words."""
         return (
             "one more equation of the loops holds"
             if self.others == 1
@@ -74,7 +74,7 @@ class ProvedBounds:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Source(Value):
-    """All that a program says of a branch."""
+    """Contents of the program of a branch."""
 
     branch: TubedBranch
     parts: tuple[SourcePart, ...]
@@ -88,7 +88,7 @@ class Source(Value):
     legs: tuple[LegMotor, ...]
     """Closed forms of the motors of a pose; none where Newton's method finds them."""
     bounds: ProvedBounds | None
-    """What is proved of its steps and answers; None where some cell has no bound."""
+    """Proved bounds of its steps and results; None if some cell has no bound."""
 
     @classmethod
     def of(cls, branch: TubedBranch, observed: Sequence[Direction], legs: Sequence[LegMotor] = ()) -> Source:

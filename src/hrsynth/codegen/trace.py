@@ -29,7 +29,7 @@ class TracedFunction(Value):
 
     @classmethod
     def of(cls, tape: Tape, names: Sequence[str], stores: Iterable[tuple[str, Place, Any]]) -> TracedFunction:
-        """What some symbols of a tape need; derivatives that are constantly zero are not stored."""
+        """Keep the operations that some symbols of a tape need; derivatives that are constantly zero are not stored."""
         single = [
             (array, place, np.ravel(value)[0] if isinstance(value, np.ndarray) else value)
             for array, place, value in stores
@@ -59,12 +59,12 @@ class FormulaTracer(Value):
 
     @property
     def places(self) -> Mapping[int, int]:
-        """Where each coordinate stands among those of q, then x."""
+        """Index of each coordinate among those of q, then x."""
         return {i: k for k, i in enumerate((*self.motors, *self.passive))}
 
     @property
     def names(self) -> list[str]:
-        """What the code calls them."""
+        """Names of the coordinates in the code."""
         return [f"q[{k}]" for k in range(len(self.motors))] + [f"x[{k}]" for k in range(len(self.passive))]
 
     def _values(self, tape: Tape) -> list[Any]:
@@ -146,5 +146,5 @@ class FormulaTracer(Value):
 
 
 def _three(array: str, first: int, vector: Any, *column: int) -> list[tuple[str, Place, Any]]:
-    """Where the components of a vector go: to places from ``first`` on."""
+    """Return the stores of a vector's components: to places from ``first`` on."""
     return [(array, (first + i, *column), each) for i, each in enumerate(np.ravel(vector))]

@@ -22,7 +22,7 @@ WITHIN = 1.6
 """How far from the middle of the robot a rest may be to be drawn, as a multiple of the robot's size."""
 LOOKS: dict[str, dict[str, Any]] = {
     "goal": {"color": palette.colour("goal"), "marker": "*", "markersize": 13},
-    "mode": {"color": palette.colour("mode"), "marker": "D", "markersize": 8},
+    "assembly mode": {"color": palette.colour("mode"), "marker": "D", "markersize": 8},
     "antipodal": {"color": SERIES[3], "marker": "s", "markersize": 8},
     "critical": {"color": SERIES[1], "marker": "o", "markersize": 8},
     "other": {"color": "0.6", "marker": "x", "markersize": 5},
@@ -30,7 +30,7 @@ LOOKS: dict[str, dict[str, Any]] = {
 BASE: dict[str, Any] = {"color": "black", "marker": "s", "markersize": 4}
 WORDS = {
     "goal": "the goal",
-    "mode": "another mode",
+    "assembly mode": "another mode",
     "antipodal": "antipodal pose",
     "critical": "pose with an error that attracts",
     "other": "rest that does not attract",

@@ -41,11 +41,11 @@ LEAST_TURN = 0.01
 """Turns below this (degrees) are not drawn."""
 ENDS = {
     "goal": "the goal",
-    "mode": "another assembly mode",
+    "assembly mode": "another assembly mode",
     "antipodal": "an antipodal pose",
     "local minimum": "a local minimum",
-    "boundary": "a boundary of the workspace",
-    "lost from sight": "a place from which a camera does not see all",
+    "limit reached": "a boundary of the workspace",
+    "out of view": "a place from which a camera does not see all",
     "time": "the end of its time",
     "undecided": "a place that is not decided",
 }

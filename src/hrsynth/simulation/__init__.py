@@ -1,1 +1,1 @@
-"""The servo loop: control law, simulated runs, the dynamic simulation and the camera bench."""
+"""Servo loop: control law, simulated runs, dynamic simulation and rendered images."""

@@ -1,4 +1,4 @@
-"""A pinhole camera that sees legs as cylinders: their edges, and the directions rebuilt from them (MMT 2.1-2.2).
+"""Pinhole camera that images legs as cylinders: their edges, and the directions computed from them (MMT 2.1-2.2).
 
 In the camera's frame x points right, y down and z ahead. An axis through P with direction u has the unit normal h of
 its interpretation plane and the distance h from the camera: h h = P × u.
@@ -24,16 +24,16 @@ from .mujoco_model import RADIUS
 from .noise import NoiseSamples
 
 VIEWS = 200
-"""Places around the legs that are tried for a camera."""
+"""Camera positions around the legs that are tried."""
 MARGIN = 0.85
-"""Part of the picture, from its middle, in which all legs are to lie."""
+"""Fraction of the image, from its centre, in which all legs must lie."""
 SHORTEST, HALF = 0.05, 0.25
 """Rods shorter than this part of the robot's length are drawn with this half-length instead."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Cylinder(Value):
-    """The cylinder of an observed direction: ends in its link's frame (2, 3), the second ahead along it, radius (m)."""
+    """Cylinder of an observed direction: ends in its link's frame (2, 3), the second ahead along it, radius (m)."""
 
     link: str
     ends: Array
@@ -51,28 +51,28 @@ class Camera(Value):
     height: int = 480
 
     def project(self, X_reference: Array, poses: Poses, rod: Cylinder) -> Array:
-        """The ends of a rod in the camera's frame, (2, 3)."""
+        """Return the ends of a rod in the camera's frame, (2, 3)."""
         X = inverse(X_reference @ self.place) @ poses(rod.link)
         return np.asarray(rod.ends @ X[:3, :3].T + X[:3, 3])
 
     def pixels(self, points: Array) -> Array:
-        """Where points (n, 3) of the camera's frame are in the picture, (n, 2)."""
+        """Return the image coordinates (n, 2) of points (n, 3) in the camera frame."""
         return self.focal * points[:, :2] / points[:, 2:] + np.array([self.width, self.height]) / 2
 
     def ray(self, pixel: Array) -> Array:
-        """The ray (3,), z = 1, through a place (2,) in the picture."""
+        """Return the ray (3,), z = 1, through an image point (2,)."""
         return np.array([*(pixel - np.array([self.width, self.height]) / 2) / self.focal, 1.0])
 
 
 def edges(ends: Array, radius: float) -> tuple[Array, Array]:
-    """The unit normals (3,) of the two planes through the camera that touch a cylinder whose axis has the ends (2, 3)
-    (eqs. 3-4); raises ``BadRequest`` where the camera is inside of it."""
+    """Return the unit normals (3,) of the two camera planes tangent to a cylinder whose axis has the ends (2, 3)
+    (eqs. 3-4); raises ``BadRequest`` if the camera is inside of it."""
     u = unit(ends[1] - ends[0])
     moment = np.cross(ends[0], u)
     distance = float(np.linalg.norm(moment))
     if distance <= radius:
         raise BadRequest(
-            "the camera is inside a leg or looks along it, distance from its axis (m)",
+            "the camera is inside a leg or looks along it: distance from its axis (m)",
             distance,
             f"more than its radius {radius:.4g}",
         )
@@ -84,12 +84,12 @@ def edges(ends: Array, radius: float) -> tuple[Array, Array]:
 
 
 def rebuilt(first: Array, second: Array) -> Array:
-    """The direction (3,) of a cylinder from the normals of its two edges (eq. 5); singular where they coincide."""
+    """Return the direction (3,) of a cylinder from the normals of its two edges (eq. 5); singular if they coincide."""
     return unit(np.cross(first, second))
 
 
 def cylinders(mechanism: Mechanism, observations: Sequence[Observation]) -> tuple[Cylinder, ...]:
-    """The rods of observed directions: as long as their joints are apart."""
+    """Return the rods of observed directions, as long as the distance of their joints."""
     found = []
     for observation in observations:
         assert isinstance(observation, Direction)
@@ -106,8 +106,8 @@ def cylinders(mechanism: Mechanism, observations: Sequence[Observation]) -> tupl
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Edges(Value):
-    """Directions rebuilt from the edges of the legs in the picture, each edge known by two points in it that are wrong
-    by up to ``pixels`` across the edge."""
+    """Directions computed from the edges of the legs in the image. Each edge is given by two image points with errors
+    of up to ``pixels`` across the edge."""
 
     camera: Camera
     reference: str
@@ -116,7 +116,7 @@ class Edges(Value):
     shocks: NoiseSamples
 
     def __call__(self, time: float, poses: Poses, directions: Measures) -> Array:
-        """The measured directions (k, 3) in the reference link's frame."""
+        """Return the measured directions (k, 3) in the reference link's frame."""
         shock = self.shocks.at(time) * self.pixels / self.camera.focal
         found = []
         for number, rod in enumerate(self.rods):
@@ -130,7 +130,7 @@ class Edges(Value):
 
 
 def _move_edge(normal: Array, ends: Array, shift: Array) -> Array:
-    """The normal of an edge whose image is moved across itself by ``shift`` (two numbers) at the rod's ends."""
+    """Return the normal of an edge whose image is moved across itself by ``shift`` (two numbers) at the rod's ends."""
     across = unit(np.array([normal[0], normal[1], 0.0]))
     points = []
     for end, by in zip(ends, shift, strict=False):
@@ -144,8 +144,8 @@ def _move_edge(normal: Array, ends: Array, shift: Array) -> Array:
 def place_camera(
     rods: Sequence[Cylinder], reference: str, poses: Sequence[Poses], blank: Camera | None = None
 ) -> Camera:
-    """A camera on the reference link from which all rods lie in the picture at all given poses, where the rebuilt
-    directions suffer least from errors of pixels: among places on a sphere of directions around them."""
+    """Return a camera on the reference link whose image contains all rods at all given poses. Of the positions on a
+    sphere around the rods it is the one at which pixel errors change the computed directions least."""
     ends = np.array([rods_in_frame(rods, reference, X) for X in poses])
     best, found = np.inf, Camera(np.eye(4))
     for ahead in _sphere(VIEWS):
@@ -158,13 +158,13 @@ def place_camera(
 
 
 def rods_in_frame(rods: Sequence[Cylinder], reference: str, poses: Poses) -> Array:
-    """The ends of rods (rods, 2, 3) in the frame of the reference link."""
+    """Return the ends of rods (rods, 2, 3) in the frame of the reference link."""
     frames = [inverse(poses(reference)) @ poses(rod.link) for rod in rods]
     return np.array([rod.ends @ X[:3, :3].T + X[:3, 3] for rod, X in zip(rods, frames, strict=True)])
 
 
 def facing(points: Array, ahead: Array, right: Array, blank: Camera | None = None) -> Camera:
-    """The camera that looks along ``ahead``, so far back that all points (…, 3) lie in its picture."""
+    """Return the camera that looks along ``ahead`` from the distance at which its image contains all points (…, 3)."""
     blank = Camera(np.eye(4)) if blank is None else blank
     middle = points.reshape(-1, 3).mean(axis=0)
     R = np.column_stack([right, np.cross(ahead, right), ahead])
@@ -175,8 +175,8 @@ def facing(points: Array, ahead: Array, right: Array, blank: Camera | None = Non
 
 
 def sensitivity(ends: Array, radius: float) -> float:
-    """How far (rad) the rebuilt direction of a rod turns for each radian by which the ends of its two edges are wrong,
-    all at their worst; infinite where the camera is inside the rod."""
+    """Return the largest rotation (rad) of a rod's computed direction per radian of error at the ends of its two edges;
+    infinite if the camera is inside the rod."""
     try:
         normals = edges(ends, radius)
     except BadRequest:

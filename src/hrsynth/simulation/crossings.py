@@ -1,9 +1,9 @@
-"""What a run passed: how near it came to Type 2 singularities, and which kinds of singular poses it crossed.
+"""Singularities along a run: the smallest distance to a Type 2 singularity, and the singularities that the run crosses.
 
-Side by side along the run, the rates of the directions and the twists of the platform are determinants on one tangent
-space. Where the first alone changes its sign the run crossed a Type 2 singularity of the hidden robot, where the second
-alone does a watched leg passed its limit (Type 1) into another working mode, where both do a leg that is not watched
-did. Where the loops' own constraints change their sign the run crossed a constraint singularity.
+On one tangent space the rates of the directions and the twists of the platform are determinants. They are compared at
+successive configurations. If only the first changes its sign, the run crosses a Type 2 singularity of the hidden robot.
+If only the second does, an observed leg passes a Type 1 singularity into another working mode. If both do, an
+unobserved leg does so. If the loop constraints change their sign, the run crosses a constraint singularity.
 """
 
 from __future__ import annotations
@@ -26,27 +26,27 @@ from ..tolerances import DAMPED, INVERTED
 
 TYPE_2, TYPE_1, LIMIT, CONSTRAINT = "type2", "type1", "limit", "constraint"
 LOOPS = 2
-"""The place of the loops among the three maps."""
+"""Index of the loops among the three maps."""
 
 
 @dataclass(frozen=True)
 class RunCrossing:
-    """A crossing: its kind and the place along the run from which on the side is the other one. Sides are told apart
-    before and after, where no map is singular."""
+    """Singularity crossed by a run. ``place`` is the first configuration on the far side; sides are compared at regular
+    configurations."""
 
     kind: str
     place: int
 
 
 class RunCrossingRecord(NamedTuple):
-    """A singularity or limit that was passed, and when (s)."""
+    """Singularity crossed by the run, and its time (s)."""
 
     kind: str
     time: float
 
 
 class TrackRecord(NamedTuple):
-    """The smallest singular value on the way, when (s) it was met, and what was passed."""
+    """Smallest singular value along the run, its time (s), and the crossings."""
 
     smallest: Number
     at: Number
@@ -55,18 +55,18 @@ class TrackRecord(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SingularityTrack(Value):
-    """Smallest singular value of Mᵀ at each configuration (n,), NaN where Mᵀ does not exist, and the passages; None
-    where the robot has motions that its platform and watched legs do not show, so that no sign is defined."""
+    """Smallest singular value of Mᵀ at each configuration (n,), NaN where Mᵀ does not exist, and the crossings; None if
+    motions of the robot change neither platform nor observed legs, so that no sign is defined."""
 
     smallest: Array
     passages: tuple[RunCrossing, ...] | None
 
     def crossings(self, kind: str) -> tuple[RunCrossing, ...]:
-        """The passages of one kind."""
+        """Return the crossings of one kind."""
         return tuple(each for each in self.passages or () if each.kind == kind)
 
     def timed(self, times: Array) -> TrackRecord:
-        """The same with the times (n,) of the configurations."""
+        """Return the smallest singular value and the crossings with their times (n,)."""
         passed = [RunCrossingRecord(each.kind, times[each.place]) for each in self.passages or ()]
         crossings = None if self.passages is None else passed
         if not np.isfinite(self.smallest).any():
@@ -77,8 +77,8 @@ class SingularityTrack(Value):
 
 @dataclass(frozen=True, eq=False)
 class _Mark:
-    """A tangent space (nv, n), and on it the rates of directions (rows, n) and the twists (rows, n); the rows of the
-    loops (rows, nv) with a basis of their range, and their weakest singular value as part of the largest."""
+    """Tangent space (nv, n) of a configuration: the rates of directions (rows, n) and the twists (rows, n) on it, the
+    loop rows (rows, nv) with a basis of their range, and their smallest singular value relative to the largest."""
 
     basis: Array
     rates: Array
@@ -89,18 +89,18 @@ class _Mark:
 
     @cached_property
     def least(self) -> Array:
-        """The smallest singular values (3,) of rates, twists and loops (a part of the largest)."""
+        """Smallest singular values (3,) of rates, twists and loops (a part of the largest)."""
         return np.array(
             [*(np.linalg.svd(each, compute_uv=False)[-1] for each in (self.rates, self.twists)), self.weakest]
         )
 
     @property
     def clear(self) -> bool:
-        """Whether no map is singular, so that sides can be told."""
+        """Return True if no map is singular, so that the sides can be compared."""
         return bool(np.all(self.least > DAMPED))
 
     def smallest(self, dof: int) -> float:
-        """The smallest singular value of Mᵀ."""
+        """Smallest singular value of Mᵀ."""
         left, values, _ = np.linalg.svd(self.twists, full_matrices=False)
         if len(values) < dof or values[dof - 1] <= INVERTED * values[0]:
             return np.nan
@@ -114,7 +114,7 @@ def track_run(
     moving: ObservationModel,
     dof: int,
 ) -> SingularityTrack:
-    """The track of a run; ``question`` holds what is observed, ``moving`` everything that counts as motion."""
+    """Track the singularities of a run; ``moving`` has all motions that count."""
     marks = [_mark(at, observation_model, moving) for at in configurations]
     smallest = np.array([mark.smallest(dof) for mark in marks])
     if any(mark.basis.shape[1] != dof for mark in marks):
@@ -168,5 +168,5 @@ def _turned_maps(a: _Mark, b: _Mark) -> Array:
 
 
 def _sign(matrix: Array) -> float:
-    """The sign of a determinant, 1 where it is zero."""
+    """Return the sign of a determinant, 1 if it is zero."""
     return float(np.linalg.slogdet(matrix)[0]) or 1.0

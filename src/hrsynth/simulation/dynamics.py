@@ -1,5 +1,4 @@
-"""The dynamic simulation: the same controller drives a MuJoCo model in MuJoCo (the papers' virtual MuJoCo model, MMT
-5.1.1).
+"""Dynamic simulation: the same controller drives a model of the robot in MuJoCo (MMT 5.1.1).
 
 The directions are read from the simulated bodies, the motors' coordinates from their encoders. At each sample the
 model of the robot takes the motors' coordinates, and the speeds that the law commands are held until the next.
@@ -33,7 +32,7 @@ SAMPLE = 0.01
 
 
 def simulator(what: str) -> Any:
-    """The module mujoco; raises ``MissingExtra`` where it is not installed."""
+    """Return the module mujoco; raises ``MissingExtra`` if it is not installed."""
     try:
         import mujoco
     except ImportError:
@@ -43,27 +42,28 @@ def simulator(what: str) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class DynamicSimulation:
-    """A MuJoCo model that starts at a configuration of a robot."""
+    """MuJoCo model that starts at a configuration of a robot."""
 
     setup: ObservedRobot
     start: ClosedConfiguration
 
     @classmethod
     def of(cls, setup: ObservedRobot, start: ClosedConfiguration) -> DynamicSimulation:
-        """The bench; raises ``MissingExtra``, and ``BadRequest`` where the robot's motors do not move all of it."""
+        """Build the dynamic simulation; raises ``MissingExtra``, and ``BadRequest`` if the motors do not determine the
+        robot's motion."""
         simulator("the dynamic simulation")
         observation_model = motors(setup)
         if relation(start, observation_model).unobserved_twists.shape[1]:
             raise BadRequest(
                 f"{setup.robot.name}: its motors do not determine the platform's motion",
                 str(setup.motion.pose(start.pose(setup.motion.link))),
-                "a robot whose motors do",
+                remedy="Omit --dynamics, or use a robot whose motors do.",
             )
         return cls(setup, start)
 
     @cached_property
     def mechanism(self) -> Mechanism:
-        """The robot with the start as its zero configuration."""
+        """Robot with the start as its zero configuration."""
         return rezero(self.start)
 
     @cached_property
@@ -114,14 +114,14 @@ class DynamicSimulation:
         return run, displacement(data, self.setup.motion.link)
 
     def _is_settled(self, loop: Loop, commands: list[Command]) -> bool:
-        """Whether the error vanishes, or has stayed as it is for a time constant 1 / λ."""
+        """Return True if the error vanishes, or has been constant for a time constant 1 / λ."""
         now, back = commands[-1].size, round(1 / (loop.law.gain * SAMPLE))
         if now < BENCH_SETTLED:
             return True
         return len(commands) > back and abs(now - commands[-1 - back].size) < BENCH_STEADY * now
 
     def _command(self, loop: Loop, time: float, at: ClosedConfiguration, data: Any) -> Command:
-        """The law's command for the directions of the simulated bodies."""
+        """Return the command of the law for the directions of the simulated bodies."""
         observation_model, start = loop.law.observation_model, self.start
         reference = observation_model.reference
 
@@ -143,8 +143,8 @@ class DynamicSimulation:
 def read_encoders(
     start: ClosedConfiguration, at: ClosedConfiguration, places: list[int], moved: Array
 ) -> ClosedConfiguration | None:
-    """The configuration next to ``at`` to which these motors have moved since the start; None where there is none. What
-    more motors say than how they can move together is left out."""
+    """Return the configuration next to ``at`` with these motor displacements since the start; None if there is none.
+    Displacements that coupled motors cannot have are projected out."""
     free, _ = range_basis(at.kernel()[0][places], 1.0)
     chart = TangentChart(start, np.eye(at.model.nv)[:, places] @ free)
     try:
@@ -154,7 +154,7 @@ def read_encoders(
 
 
 def displacement(data: Any, link: str) -> Array:
-    """The displacement (4, 4) of a simulated body since the start."""
+    """Return the displacement (4, 4) of a simulated body since the start."""
     body = data.body(link)
     X = np.eye(4)
     X[:3, :3] = body.xmat.reshape(3, 3)

@@ -1,12 +1,12 @@
-"""The control law that servoes what is measured (MMT 2.3.2, eqs. 9-12), for any robot and any observations; and the
-desired values in time: those of the goal at once, or led along the straight way of poses.
+"""Control law on the measured values (MMT 2.3.2, eqs. 9-12), for any robot and any observations; and the desired values
+in time: those of the goal at once, or along the straight path of poses.
 
 Each kind of observation gives its error e_i and ∂e_i/∂y_i: of directions e_i = u_i × u_di and −[u_di]ₓ, L_iᵀ = −[u_di]ₓ
 M_iᵀ. Then τ = −λ L^{T+} e and q̇ = J_inv τ are solved at once on the tangent space of the closed loops: with B a basis
-of it and U B the rates of the values, q̇ = −λ B (L U B)⁺ e, where L stacks the ∂e_i/∂y_i. The rates of what is seen in
-an image need its depth, which the law may only suppose: ``planes``.
-Where the robot sees all of its platform's twist this is the same velocity of least norm; and it stays finite where Mᵀ
-does not exist because a watched leg is stretched (Type 1), as the motion through such a pose is.
+of it and U B the rates of the values, q̇ = −λ B (L U B)⁺ e, where L stacks the ∂e_i/∂y_i. The rates of image values
+need a depth, which the law may assume: ``planes``. If all platform twists are observed, this is the same velocity of
+least norm; and it stays finite where Mᵀ does not exist because an observed leg is stretched (Type 1), as the motion
+through such a pose is.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ Desired = Callable[[float], tuple[Measures, Measures]]
 Poses = Callable[[str], Array]
 """The pose X_BL (4, 4) of each link."""
 Sense = Callable[[float, Poses, Measures], Measures]
-"""What is measured at a time where the links are at their poses and the true values are given."""
+"""Measured values at a time, given link poses and true values."""
 POSES = 24
 """Poses between start and goal at which the values of a trajectory are taken."""
 SUPPOSED = "exact, desired or constant:METRES"
@@ -53,9 +53,8 @@ Depth = Annotated[
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Command(Value):
-    """What the law commands at a configuration: joint velocities (nv,), of each observation the true error, the true
-    value and the measured one, and the singular values of the rows that it inverts, as many as the platform has
-    freedoms, largest first."""
+    """Command at a configuration: joint velocities (nv,), of each observation the true error, the true value and the
+    measured one, and the singular values of the rows that it inverts, as many as the platform dof, largest first."""
 
     velocity: Array
     error: tuple[Array, ...]
@@ -80,10 +79,11 @@ class Command(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Law(Value):
-    """The law of one robot: ``question`` holds what is observed, ``dof`` its platform's freedoms, ``gain`` is λ.
+    """Control law of one robot: ``observation_model`` has the observations, ``dof`` is the platform dof, ``gain`` is λ
+    (1/s).
 
-    ``planes`` are those (3,) in which what is seen in images is supposed to lie, None of one that is known; None where
-    all are.
+    ``planes`` (3,) are those in which observed image features are assumed to lie, None for a known one; None if all are
+    known.
     """
 
     observation_model: ObservationModel
@@ -98,7 +98,7 @@ class Law(Value):
         sensed: Sense | None = None,
         time: float = 0.0,
     ) -> Command:
-        """The command at a configuration (of the joint velocities of its twin)."""
+        """Return the command at a configuration (of the joint velocities of its model)."""
         every = self.observation_model.observations
         y, exact = measure_all(configuration, self.observation_model)
         wanted, moving = desired
@@ -160,7 +160,7 @@ def supposed_planes(
     except ValueError:
         depth = np.nan
     if depth is not None and not (word == "constant" and 0 < depth <= FARTHEST_POSE):
-        raise BadRequest("depth", text, f"{SUPPOSED}, more than 0 and at most {FARTHEST_POSE:g}")
+        raise BadRequest("--depth", text, f"{SUPPOSED} (0 to {FARTHEST_POSE:g})")
     found: list[Array | None] = []
     for seen in observation_model.observations:
         plane = None
@@ -169,9 +169,8 @@ def supposed_planes(
         found.append(plane if plane is None or depth is None else depth_plane(np.array([depth])))
     if not any(plane is not None for plane in found):
         raise BadRequest(
-            "--depth: nothing that is observed needs a depth",
-            text,
-            "none, or --sensor of what is seen in an image: point, image_line, edge …",
+            f"--depth {text}: no observation needs a depth",
+            remedy="Omit it, or add an image feature with --sensor: point, image_line or edge.",
         )
     return tuple(found)
 
@@ -186,7 +185,7 @@ def damped_inverses(values: Array) -> Array:
 def measure_all(
     configuration: ClosedConfiguration, observation_model: ObservationModel
 ) -> tuple[tuple[Array, ...], list[Array]]:
-    """Of each observation the value (size,) and the rates (size, nv)."""
+    """Return the value (size,) and the rates (size, nv) of each observation."""
     _, _, values, rates = measure(
         configuration.model, configuration.q, observation_model.reference, observation_model.observations
     )
@@ -194,7 +193,7 @@ def measure_all(
 
 
 def directions(configuration: ClosedConfiguration, observation_model: ObservationModel) -> tuple[Array, list[Array]]:
-    """The same where all are directions, (k, 3) and (3, nv)."""
+    """Return values (k, 3) and rates (3, nv) if all are directions."""
     values, rates = measure_all(configuration, observation_model)
     return np.array(values), rates
 
@@ -211,8 +210,8 @@ class FixedDirections(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(Value):
-    """Values through ``marks`` (n, rows) in ``duration`` (s), at rest at both ends, then those of the last mark;
-    ``sizes`` are the rows of each observation, ``units`` says which are unit vectors."""
+    """Values through ``marks`` (n, rows) in ``duration`` (s), with zero rates at both ends, then those of the last
+    mark; ``sizes`` are the rows of each observation, ``units`` marks unit vectors."""
 
     marks: Array
     duration: float

@@ -22,21 +22,21 @@ from ..mechanism.screws import elementary
 GRAVITY = 9.81
 """m/s²."""
 DENSITY = 1500.0
-"""Of all rods (kg/m³)."""
+"""Density of all rods (kg/m³)."""
 RADIUS = 0.02
-"""Of all rods, in characteristic lengths of the robot."""
+"""Radius of all rods, in characteristic lengths of the robot."""
 STEP = 5e-4
 """Seconds of a step of the simulation."""
 STIFF = {"solref": "0.001 1", "solimp": "0.9999 0.9999 0.001 0.5 2"}
 """Loops that keep closed to micrometres."""
 ROTOR = 1e4
-"""What a geared motor's rotor adds to its joint: parts of the inertia of a rod as long as the robot."""
+"""Rotor inertia of a geared motor: fraction of the inertia of a rod as long as the robot."""
 LAG = 0.004
 """Time constant of a motor's velocity servo with that rotor (s)."""
 CUT = 100.0
-"""What is added to a joint through which a loop is cut: parts of the same inertia; its light body yields without."""
+"""Inertia added to a joint through which a loop is cut: fraction of the same; its light body yields without."""
 DAMPING = 1e-3
-"""Of passive joints, as a part of that inertia a second."""
+"""Damping of passive joints, as a fraction of that inertia per second."""
 DRIVEN = 100.0
 _WEIGHTS = {"F": 0.0, "R": 1.0, "P": 1.0, "C": 2.0, "U": 2.0, "E": 3.0, "S": 4.0}
 
@@ -50,13 +50,13 @@ class MujocoModel:
 
     @property
     def radius(self) -> float:
-        """Of the rods (m)."""
+        """Radius of the rods (m)."""
         return RADIUS * self.mechanism.length
 
 
 def mockup(mechanism: Mechanism) -> str:
-    """The MJCF of a mechanism that is to move from its zero configuration under gravity along −z; motors are named as
-    their joints. Raises ``BadMechanism`` for a joint that leaves all six freedoms."""
+    """Return the MJCF of a mechanism that moves from its zero configuration under gravity along −z; motors are named as
+    their joints. Raises ``BadMechanism`` for a joint with six dof."""
     made = MujocoModel(mechanism)
     root = made.root
     root.set("model", mechanism.name)
@@ -94,7 +94,7 @@ def _cut(mechanism: Mechanism) -> tuple[list[tuple[Joint, str]], list[Joint]]:
     joints = list(mechanism.joints.values())
     for joint in joints:
         if joint.type is JointType.FREE:
-            raise BadMechanism(f"{mechanism.name}: a joint with six freedoms has no MuJoCo model", joint.name)
+            raise BadMechanism(f"{mechanism.name}: a joint with six dof has no MuJoCo model", joint.name)
     weights = [_WEIGHTS[joint.type.value] - (DRIVEN if joint.actuated else 0.0) for joint in joints]
     tree = graphs.spanning_forest(mechanism.links, joints, weights)
     ordered = [(joint, near) for joint, near, _ in graphs.outward(mechanism.base, tree)]
@@ -102,7 +102,7 @@ def _cut(mechanism: Mechanism) -> tuple[list[tuple[Joint, str]], list[Joint]]:
 
 
 def coordinates(joint: Joint) -> Iterator[tuple[str, str, Array]]:
-    """Name, type (hinge, slide or ball) and axis of the simulated joints that make up a joint."""
+    """Yield name, MJCF type and axis of the simulated joints that make up a joint."""
     if joint.type is JointType.SPHERICAL:
         yield joint.name, "ball", np.array([0.0, 0.0, 1.0])
         return

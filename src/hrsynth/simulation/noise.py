@@ -1,5 +1,5 @@
-"""Errors of what is measured, seeded: of directions inside a cone about each true one (MMT A.1); of other kinds as each
-says; from picture to picture, or the same all along a run (a bias, as of a lens whose distortion is not corrected)."""
+"""Seeded measurement errors: of directions inside a cone about each true one (MMT A.1); of other kinds as their classes
+define; independent from image to image, or constant along a run (a bias, as of an uncorrected lens distortion)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..mechanism.observation import Observation
 from ..results import Value
 
 PERIOD = 0.04
-"""Seconds between two independent errors (25 pictures a second); in between they change linearly."""
+"""Seconds between two independent errors (25 images per second); in between they change linearly."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -27,7 +27,7 @@ class NoiseSamples(Value):
 
     @classmethod
     def draw(cls, count: int, horizon: float, seed: int, bias: bool = False) -> NoiseSamples:
-        """Shocks of ``count`` quantities until ``horizon`` (s), uniform in the ball; of a bias only one for each."""
+        """Draw samples of ``count`` quantities until ``horizon`` (s), uniform in the ball; one each for a bias."""
         rng = np.random.default_rng(seed)
         shape = (1 if bias else math.ceil(horizon / PERIOD) + 2, count)
         vectors = rng.normal(size=(*shape, 3))
@@ -53,14 +53,14 @@ class Sensors(Value):
 
     @classmethod
     def of(cls, observations: Sequence[Observation], noise: Noise, horizon: float, seed: int, length: float) -> Sensors:
-        """Of a seed, until ``horizon`` (s); raises ``BadRequest`` for noise that none of them has, and for pixels of a
-        camera without a focal length."""
+        """Build the sensors for a seed, until ``horizon`` (s); raises ``BadRequest`` for noise that none of them has,
+        and for pixels of a camera without a focal length."""
         amounts = noise.amounts_for(observations)
         count = sum(vectors(each) for each in observations)
         return cls(tuple(observations), amounts, NoiseSamples.draw(count, horizon, seed, noise.bias), length)
 
     def __call__(self, time: float, poses: Callable[[str], Array], values: Sequence[Array] | Array) -> list[Array]:
-        """What is measured where the true values are these."""
+        """Return the measurements of true values."""
         shocks, first, found = self.shocks.at(time), 0, []
         for each, value in zip(self.observations, values, strict=True):
             own = shocks[first : first + vectors(each)]

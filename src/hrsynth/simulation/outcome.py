@@ -1,5 +1,5 @@
-"""Where a run ended, in the words of docs/pages/proofs.md, section 11: goal, mode, antipodal, local minimum, boundary,
-lost from sight, time; or undecided."""
+"""Outcome of a run, in the words of docs/pages/proofs.md, section 11: goal, assembly mode, antipodal, local minimum,
+limit reached, out of view, time, undecided."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from ..tolerances import DAMPED, NEAR_MODE, SAME_NEAR_POSE, SAME_RELATION
 from .law import Command, Measures
 from .run import AWAY, EFFORT, LIMIT, LOST, OPEN, POISED, REST, SERVED_AT, UNMEASURED, UNSEEN, Run
 
-GOAL, MODE, ANTIPODAL, MINIMUM, BOUNDARY, TIME = "goal", "mode", "antipodal", "local minimum", "boundary", "time"
-SIGHT, UNDECIDED = "lost from sight", "undecided"
+GOAL, MODE, ANTIPODAL, MINIMUM = "goal", "assembly mode", "antipodal", "local minimum"
+BOUNDARY, SIGHT, TIME, UNDECIDED = "limit reached", "out of view", "time", "undecided"
 ENDINGS = (GOAL, MODE, ANTIPODAL, MINIMUM, BOUNDARY, SIGHT, TIME, UNDECIDED)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RunOutcome(Value):
-    """How a run ended and why that is its name; ``matched`` is the number of the assembly mode, counted from 1 in the
-    list of all modes of the goal's directions (None if it is none of them, or if they cannot be listed)."""
+    """Outcome of a run and its reason; ``matched`` is the number of the assembly mode, counted from 1 in the list of
+    all modes of the goal's directions (None if it is none of them, or if they cannot be listed)."""
 
     name: Annotated[str, As("ended")]
     reason: Recorded[str]
@@ -40,37 +40,37 @@ class RunOutcome(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OutcomeClassifier(Value):
-    """Names endings by the goal's configuration and measured values."""
+    """Classifier of outcomes by the goal's configuration and measured values."""
 
     setup: ObservedRobot
     goal: ClosedConfiguration
     wanted: Measures
 
     def classify(self, run: Run, values: Measures) -> RunOutcome:
-        """The ending of a run at whose end these values are measured."""
+        """Return the outcome of a run with these values measured at its end."""
         last = run.commands[-1]
         if run.stopped == SERVED_AT:
             return self._serve(run.last, values)
         if run.stopped in (REST, POISED):
             ending = rest(self.setup, run.last, last)
-            loose = "" if run.stopped == REST else "; this rest was not found to attract"
+            loose = "" if run.stopped == REST else "; this equilibrium was not found to be stable"
             return replace(ending, reason=ending.reason + loose + self._near(run.last, last.size))
         if run.stopped == LIMIT:
             return RunOutcome(BOUNDARY, f"joint {run.joint} is at its limit")
         if run.stopped == UNSEEN:
-            return RunOutcome(SIGHT, f"{self._unseen(run.last)}: the loop has nothing to act on")
+            return RunOutcome(SIGHT, f"{self._unseen(run.last)}: the error is undefined")
         if run.stopped == UNMEASURED:
             return RunOutcome(
                 SIGHT,
-                "a point or line comes to the camera's centre, or the camera into a cylinder: what is "
-                "measured has no value there",
+                "a point or line reaches the camera centre, or the camera enters a cylinder: the measured value is "
+                "undefined there",
             )
         if run.stopped == OPEN:
-            return RunOutcome(BOUNDARY, "the loops lose their rank here, and the integrator could not continue")
+            return RunOutcome(BOUNDARY, "the loops lose rank here, and the integrator could not continue")
         if run.stopped == LOST:
-            return RunOutcome(UNDECIDED, "the integrator could not continue, which says nothing about the robot")
+            return RunOutcome(UNDECIDED, "the integrator could not continue: the end of the run is undecided")
         if run.stopped == AWAY:
-            return RunOutcome(BOUNDARY, "the platform runs away, nothing limits its slides")
+            return RunOutcome(BOUNDARY, "the platform runs away: no joint limit stops it")
         over = (
             f"more than {RUN_EVALUATIONS:,} configurations would be needed"
             if run.stopped == EFFORT
@@ -81,14 +81,11 @@ class OutcomeClassifier(Value):
             there, slow = run.ahead
             goal = self.same_pose(there, self.goal.pose(self.setup.motion.link))
             pose = "the goal" if goal else str(self.setup.motion.pose(there.pose(self.setup.motion.link)))
-            way = (
-                f"; it was still on its way to a rest that attracts, found at {pose}, where the distance left falls "
-                f"by a factor of e every {slow:.3g} s"
-            )
+            way = f"; it was still approaching a stable equilibrium at {pose}, with the time constant {slow:.3g} s"
         return RunOutcome(TIME, f"{over}, with ‖e‖ = {last.size:.3g}{way}")
 
     def _near(self, at: ClosedConfiguration, size: float) -> str:
-        """Which near mode of the goal a rest is, if any."""
+        """Return a text on the near mode of the goal at an equilibrium, if any."""
         motion = self.setup.motion
         try:
             listed = modes(self.setup, at=motion.pose(self.goal.pose(motion.link))) if size < NEAR_MODE else None
@@ -96,7 +93,7 @@ class OutcomeClassifier(Value):
             return ""
         return next(
             (
-                f"; it is near mode {k} of the goal: what is measured differs {mode.differs}"
+                f"; it is near mode {k} of the goal: the measured values differ {mode.differs}"
                 for k, mode in enumerate(() if listed is None else listed.near_modes, 1)
                 if mode.bodies
                 and all(
@@ -108,10 +105,10 @@ class OutcomeClassifier(Value):
         )
 
     def _unseen(self, at: ClosedConfiguration) -> str:
-        """What a camera has lost."""
+        """Return a text on the observation that leaves its camera's field of view."""
         reference = self.setup.mechanism.reference
         first = min(self.setup.observed, key=lambda o: o.in_front(at.pose(o.seen_from or reference), at.pose(o.link)))
-        return f"{first.kind} {first.leg} leaves the camera's sight"
+        return f"{first.kind} {first.leg} leaves the field of view"
 
     def _serve(self, at: ClosedConfiguration, values: Measures) -> RunOutcome:
         opposite = [
@@ -124,8 +121,8 @@ class OutcomeClassifier(Value):
             there = "; the pose is the goal's" if self.same_pose(at, self.goal.pose(self.setup.motion.link)) else ""
             return RunOutcome(
                 ANTIPODAL,
-                f"{sum(opposite)} of {len(opposite)} directions end opposite to the desired "
-                f"ones, where the error vanishes as well{there}",
+                f"{sum(opposite)} of {len(opposite)} directions are opposite to the desired ones, where the error "
+                f"vanishes as well{there}",
             )
         if self.same_pose(at, self.goal.pose(self.setup.motion.link)):
             return RunOutcome(GOAL, f"the {word} and the pose are those of the goal")
@@ -133,7 +130,7 @@ class OutcomeClassifier(Value):
             motion = self.setup.motion
             listed = modes(self.setup, at=motion.pose(self.goal.pose(motion.link)))
         except HrsynthError as error:
-            return RunOutcome(MODE, f"the {word} are the goal's, the pose is not; modes not listed: {error}")
+            return RunOutcome(MODE, f"the {word} are the goal's, the pose is not; assembly modes not listed: {error}")
         for number, mode in enumerate(listed.modes, 1):
             bodies = mode.bodies or {}
             if bodies and all(self._alike(at.pose(body), X, None) for body, X in bodies.items()):
@@ -144,11 +141,11 @@ class OutcomeClassifier(Value):
                     listed,
                 )
         return RunOutcome(
-            MODE, f"the {word} are the goal's, the pose is none of the assembly modes that were listed", None, listed
+            MODE, f"the {word} are the goal's, the pose is none of the listed assembly modes", None, listed
         )
 
     def same_pose(self, at: ClosedConfiguration, X: Array) -> bool:
-        """Whether the platform of a configuration is at X (4, 4), to ``SAME_RELATION``."""
+        """Return True if the platform of a configuration is at X (4, 4), to ``SAME_RELATION``."""
         return self._alike(at.pose(self.setup.motion.link), X, self.setup.decomposition.point)
 
     def _alike(self, X: Array, other: Array, point: Array | None) -> bool:
@@ -156,7 +153,7 @@ class OutcomeClassifier(Value):
 
 
 def rest(setup: ObservedRobot, at: ClosedConfiguration, last: Command) -> RunOutcome:
-    """What a configuration is at which the command vanishes but the error does not: a singularity of the hidden robot,
+    """Classify a configuration at which the command vanishes but the error does not: a singularity of the hidden robot,
     the limit of a leg's reach, or neither."""
     posture = ConfigurationAnalysis.of(setup).classify(at)
     where = f"‖e‖ = {last.size:.3g} and the command vanishes"
@@ -164,11 +161,7 @@ def rest(setup: ObservedRobot, at: ClosedConfiguration, last: Command) -> RunOut
     shifted = at.velocity(setup.motion.link) @ last.weak
     if weak and float(np.linalg.norm(shifted)) < DAMPED:
         tree = len(at.model.mechanism.joints) < len(at.model.mechanism.links)
-        why = (
-            "the arm is at a singularity of its own, as where it is stretched"
-            if tree
-            else "a leg that is not watched is stretched to its limit"
-        )
+        why = "the arm is singular, for example stretched" if tree else "an unobserved leg is at the limit of its reach"
         return RunOutcome(BOUNDARY, f"{where}: {why}")
     far = posture.distances
     if weak and far.type2 is not None and far.type2 < DAMPED:
@@ -182,7 +175,7 @@ def rest(setup: ObservedRobot, at: ClosedConfiguration, last: Command) -> RunOut
         )
     off = f"{where} off the singularities of the hidden robot"
     if weak:
-        return RunOutcome(MINIMUM, f"{off}: the law's own rows, with the depths that it supposes, lose rank there")
+        return RunOutcome(MINIMUM, f"{off}: the rows of the law, with the assumed depths, lose rank there")
     if sum(each.rank for each in setup.observed) > len(last.values):
-        return RunOutcome(MINIMUM, f"{off}: more is measured than the robot has freedoms")
+        return RunOutcome(MINIMUM, f"{off}: the observation is redundant")
     return RunOutcome(MINIMUM, off)

@@ -1,4 +1,4 @@
-"""Rendered pictures of the legs, and directions rebuilt from the edges that OpenCV finds in them."""
+"""Rendered images of the legs, and directions computed from the edges that OpenCV finds in them."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from .mujoco_model import RADIUS, rods
 from .noise import PERIOD
 
 COLOURS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [0, 1, 1], [1, 0, 1]], dtype=float)
-"""Of the watched legs, on black; the others are dark grey."""
+"""Colours of the observed legs, on black; the others are dark grey."""
 GREY = 0.12
 PURE = 60.0
-"""How far (of 255) a pixel may be from the colours between black and a leg's to count as that leg's."""
+"""Largest distance (of 255) of a pixel from the colours between black and a leg's to count as that leg's."""
 BLACK = 8.0
 """Lightness (of 255) below which nothing is there."""
 KEPT = 0.8
@@ -34,23 +34,23 @@ REACH = 3.0
 
 
 def vision() -> Any:
-    """The module cv2; raises ``MissingExtra`` where it is not installed."""
+    """Return the module cv2; raises ``MissingExtra`` if it is not installed."""
     try:
         import cv2
     except ImportError:
-        raise MissingExtra("finding edges in pictures", "bench") from None
+        raise MissingExtra("finding edges in images", "bench") from None
     return cv2
 
 
 def drawing() -> Any:
-    """The module mujoco, ready to draw without a screen; raises ``MissingExtra`` where it is not installed."""
+    """Return the module mujoco, ready to draw without a screen; raises ``MissingExtra`` if it is not installed."""
     os.environ.setdefault("MUJOCO_GL", "egl")
-    return simulator("rendering pictures")
+    return simulator("rendering images")
 
 
 @dataclass(frozen=True, eq=False)
 class LegRenderer:
-    """The robot's rods before a camera, each link put where it is told."""
+    """Renderer of the robot's rods before a camera, at given link poses."""
 
     mechanism: Mechanism
     camera: Camera
@@ -61,7 +61,7 @@ class LegRenderer:
 
     @cached_property
     def _links(self) -> tuple[str, ...]:
-        """What is drawn: all but the base."""
+        """Drawn links: all but the base."""
         return tuple(link for link in self.mechanism.links if link != self.mechanism.base)
 
     @cached_property
@@ -115,7 +115,7 @@ class LegRenderer:
         return mujoco.MjData(self._model), renderer
 
     def picture(self, poses: Poses) -> Array:
-        """The picture (height, width, 3), 0 to 255, with the links at their poses; raises ``NotRendered``."""
+        """Return the image (height, width, 3), 0 to 255, with the links at their poses; raises ``NotRendered``."""
         mujoco = drawing()
         data, renderer = self._renderer
         for link in self._links:
@@ -130,7 +130,7 @@ class LegRenderer:
 
     @cached_property
     def finer(self) -> LegRenderer:
-        """The same, drawn finely enough to find edges in."""
+        """Return a renderer with pixels fine enough for edge detection."""
         return replace(self, fineness=PICTURE_OVERSAMPLING)
 
     def _put(self, data: Any, name: str, X: Array) -> None:
@@ -142,7 +142,7 @@ class LegRenderer:
 
 @dataclass(frozen=True, eq=False)
 class RenderedImages:
-    """Directions rebuilt from rendered pictures, one each ``noise.PERIOD``; in between their errors are held."""
+    """Directions computed from rendered images, one each ``noise.PERIOD``; in between their errors are constant."""
 
     stage: LegRenderer
     _held: dict[int, Array] = field(default_factory=dict)
@@ -170,16 +170,16 @@ class RenderedImages:
 
 
 def shade(picture: Array, colour: Array) -> Array:
-    """How much of each pixel a leg of a colour covers, 0 to 255, (height, width); 0 where it has another colour."""
+    """Return the coverage of each pixel by a leg of a colour, 0 to 255, (height, width); 0 for other colours."""
     cover = picture @ colour / float(colour @ colour)
     other = np.linalg.norm(picture - cover[..., None] * colour, axis=2)
     return np.where(other < PURE, cover, 0.0)
 
 
 def outlines(cover: Array, light: Array, camera: Camera) -> tuple[Array, Array] | None:
-    """The unit normals of the planes of a leg's two edges, the leg on their negative side, from what it covers and how
-    light all is; None where too little of it is in the picture. Only edges beside black count: others may be those of
-    a link before it."""
+    """Return the unit normals of the planes of a leg's two edges, the leg on their negative side, from its coverage and
+    the image's brightness; None if too little of it is in the image. Only edges beside black count: others may be those
+    of a link before it."""
     cv2 = vision()
     grey = np.clip(cover, 0, 255).astype(np.uint8)
     rows, columns = np.nonzero(grey > 127)

@@ -1,4 +1,4 @@
-"""What is told of a servo run: where it started, went and ended, and what was measured on the way."""
+"""Result of a servo run: start, path, end, and the measurements along the run."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from .outcome import RunOutcome
 from .run import Run
 
 ASIDE = 0.9
-"""Part of the root mean square distance that a constant one makes up where noise holds a platform aside."""
+"""Fraction of the root mean square distance that is constant if noise shifts a platform."""
 
 
 @dataclass(frozen=True)
 class Scatter(Record, all_recorded=True):
-    """How far the platform was from the pose at which it settled, over the second half of a noisy run: metres and
+    """Distance of the platform from the pose at which it settled, over the second half of a noisy run: metres and
     radians, largest and root mean square."""
 
     metres: Annotated[float, As("position_mm", scale=MM)]
@@ -36,22 +36,38 @@ class Scatter(Record, all_recorded=True):
     rms_metres: Annotated[float, As("rms_position_mm", scale=MM)]
     rms_radians: Annotated[float, As("rms_orientation_deg", scale=DEG)]
     mean: tuple[float, float, float]
-    """Where the platform was on average."""
+    """Mean position of the platform (m)."""
     offset: Annotated[float, As("offset_mm", scale=MM)]
-    """How far that is from the pose at which it settled (m): where noise does not average out."""
+    """Distance of that from the pose at which it settled (m): noise that does not average out."""
 
     @property
     def aside(self) -> bool:
-        """Whether noise shifts the platform rather than shaking it."""
+        """Return True if noise shifts the platform instead of shaking it."""
         return self.offset > ASIDE * self.rms_metres
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Servo(Result, shown_as="servo"):
-    """A servo run: what was asked, the run, its ending, what it passed.
+    """Servo run: request, run, outcome, crossings.
 
-    With noise the ending is that of the same loop without noise, continued from where the noisy run stopped; ``spread``
-    is how far the noisy run stayed from there.
+    Attributes
+    ----------
+    start, goal, pose
+        Start, goal and final pose of the platform (m, rad, in the base frame).
+    desired
+        Measured values at the goal.
+    run
+        Times (s), configurations and commands.
+    outcome
+        Outcome; with noise that of the same loop without noise, continued from the end of the noisy run.
+    errors
+        Norms of the errors of the k observations along the run, (n, k).
+    way, turns
+        Position (m, (n, 3)) and rotation from the goal (rad, (n,)) of the platform along the run.
+    track
+        Singularities along the run.
+    spread
+        Distance of a noisy run from the final pose; None without noise.
     """
 
     setup: Annotated[ObservedRobot, FLAT]
@@ -67,58 +83,58 @@ class Servo(Result, shown_as="servo"):
     depth: Recorded[str]
     settled: ClosedConfiguration
     target: ClosedConfiguration
-    """The goal's configuration."""
+    """Configuration of the goal."""
     spread: Recorded[Scatter | None] = None
     notes: Recorded[tuple[str, ...]] = ()
-    """What a bench measured, in words."""
+    """Notes on what the dynamic simulation and noise changed."""
 
     def headline(self) -> str:
-        """The robot and where the run ended."""
-        return f"{self.setup.headline()}: ended at {self.pose}, {self.outcome}"
+        """Return the robot, the outcome and the final pose."""
+        return f"{self.setup.headline()}: {self.outcome} at {self.pose}"
 
     @property
     def outcome(self) -> str:
-        """Where it ended: one of ``ending.ENDINGS``."""
+        """Return the outcome: one of ``outcome.ENDINGS``."""
         return self.run_outcome.name
 
     @property
     @recorded()
     def pose(self) -> Pose:
-        """The pose at which it ended."""
+        """Final pose."""
         return self.pose_of(self.settled)
 
-    coordinates = Shown(FileCoordinates, lambda self: FileCoordinates.of(self.settled), "where it ended")
+    coordinates = Shown(FileCoordinates, lambda self: FileCoordinates.of(self.settled), "joint coordinates at the end")
 
     def pose_of(self, at: ClosedConfiguration) -> Pose:
-        """The platform's pose at a configuration."""
+        """Return the platform's pose at a configuration."""
         motion = self.setup.motion
         return motion.pose(at.pose(motion.link))
 
     @property
     def errors(self) -> Array:
-        """‖e_i‖ of the true errors, (n, k)."""
+        """Norms ‖e_i‖ of the true errors, (n, k)."""
         return np.array([[np.linalg.norm(e) for e in command.error] for command in self.run.commands])
 
     @property
     def way(self) -> Array:
-        """The platform's position, that of its point, along the run, (n, 3)."""
+        """Position of the platform's point along the run (m), (n, 3)."""
         motion = self.setup.motion
         return np.array([motion.position(at.pose(motion.link)) for at in self.run.configurations])
 
     @property
     def turns(self) -> Array:
-        """How far the platform is turned away from the goal along the run (rad), (n,); of a point body zero."""
+        """Rotation of the platform from the goal along the run (rad), (n,); zero for a point."""
         return np.array([self._turn(at) for at in self.run.configurations])
 
     @property
     def goal_position(self) -> Array:
-        """The position of the platform's point at the goal, (3,)."""
+        """Position of the platform's point at the goal (m), (3,)."""
         motion = self.setup.motion
         return motion.position(self.target.pose(motion.link))
 
     @property
     def from_goal(self) -> tuple[float, float]:
-        """How far the pose at which it ended is from the goal: metres, radians."""
+        """Return the distance of the final pose from the goal: metres, radians."""
         motion = self.setup.motion
         moved = motion.position(self.settled.pose(motion.link)) - self.goal_position
         return float(np.linalg.norm(moved)), self._turn(self.settled)
@@ -132,6 +148,6 @@ class Servo(Result, shown_as="servo"):
     modes = Shown(list[AssemblyMode] | None, lambda self: self.run_outcome.modes and self.run_outcome.modes.modes)
     type2 = Shown(TrackRecord, lambda self: self.track.timed(self.run.times))
     limits_ignored = Shown(list[str], lambda self: self.setup.limits_ignored, UNLIMITED)
-    times = Shown(list[float], lambda self: self.run.times, "when (s)")
-    error = Shown(list[list[float]], lambda self: self.errors, "the error of each direction at each time")
+    times = Shown(list[float], lambda self: self.run.times, "times (s)")
+    error = Shown(list[list[float]], lambda self: self.errors, "error of each observation at each time")
     poses = Shown(list[Pose], lambda self: [self.pose_of(at) for at in self.run.configurations])

@@ -1,8 +1,8 @@
-"""A servo loop in time, on closed configurations: SciPy's adaptive integrator in charts of the closed loops.
+"""Servo loop in time, on closed configurations: SciPy's adaptive integrator in charts of the closed loops.
 
-That a command is small does not prove that a loop with steady, exact directions rests: near a fold of a leg, where the
-law is stiff, an integrator's own errors keep it from vanishing. So a rest, a zero of the velocity that draws the state
-to itself, is found itself, from the state and not from the time that a run was given.
+A small command does not prove that a loop with constant, exact directions is at an equilibrium: near a fold of a leg,
+where the law is stiff, an integrator's own errors keep the command from vanishing. So a stable equilibrium, a zero of
+the velocity, is computed from the state, independent of the time limit.
 """
 
 from __future__ import annotations
@@ -46,20 +46,20 @@ SERVED_AT, REST, POISED, LIMIT, UNSEEN, OPEN = "served", "rest", "poised", "limi
 UNMEASURED = "unmeasured"
 AWAY, TIME, EFFORT, LOST = "away", "time", "effort", "lost"
 HALVINGS = 40
-"""Bisections that find the moment at which a joint meets its limit, or sight is lost."""
+"""Bisections to the time at which a joint reaches its limit, or an observation leaves the field of view."""
 NEWTON_STEPS = 8
-"""Steps in which a rest is found."""
+"""Newton steps to an equilibrium."""
 PERSISTS = 0.9
-"""Part of an error that is left a time constant later where a rest is looked for: of one that vanishes, 1 / e is."""
+"""Fraction of an error left a time constant later above which an equilibrium is sought; 1 / e if it vanishes."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Run(Value):
-    """What happened: times (n,), the configurations and commands at them, and why it stopped: the error vanished
-    (``served``), a stable rest was reached (``rest``), the command vanished where none was found (``poised``), a joint
-    met its limit (``limit``), what is observed left a camera's sight (``unseen``), the loops' rank falls (``open``),
-    the platform ran away (``away``), the time ran out (``time``), the integrator's ``RUN_EVALUATIONS`` configurations
-    were (``effort``), or it could not go on (``lost``)."""
+    """Simulated run: times (n,), the configurations and commands at them, and the reason of its end: the error vanished
+    (``served``), a stable equilibrium was reached (``rest``), the command vanished where none was found (``poised``), a
+    joint reached its limit (``limit``), an observation left its camera's field of view (``unseen``), the loops' rank
+    falls (``open``), the platform ran away (``away``), the time ran out (``time``), the integrator used its
+    ``RUN_EVALUATIONS`` configurations (``effort``), or it could not continue (``lost``)."""
 
     times: Array
     configurations: tuple[ClosedConfiguration, ...]
@@ -68,20 +68,20 @@ class Run(Value):
     joint: str | None = None
     """The joint that met its limit."""
     ahead: tuple[ClosedConfiguration, float] | None = None
-    """Where its time ended on the way to a rest that attracts: that rest, and how long (s) it takes there until what is
-    left of the slowest motion is one in e."""
+    """Stable equilibrium that the run approached when its time ended, and the time constant (s) of the slowest motion
+    there."""
 
     @property
     def last(self) -> ClosedConfiguration:
-        """Where it ended."""
+        """Final configuration."""
         return self.configurations[-1]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Loop(Value):
-    """The closed loop of a law and a robot: desired directions, steady from ``steady`` (s) on; what is sensed (None:
-    the true directions) and whether that changes smoothly with the pose (``smooth``); ``moving`` is the question whose
-    motions are all that counts."""
+    """Closed loop of a law and a robot: desired directions, constant from ``steady`` (s) on; the sensor (None: the true
+    directions) and whether its error changes smoothly with the pose (``smooth``); ``moving`` is the observation model
+    of all motions that count."""
 
     law: Law
     moving: ObservationModel
@@ -120,7 +120,8 @@ class Loop(Value):
         return Run(np.array(times), tuple(c for c, _ in found), tuple(c for _, c in found), stopped, joint, ahead)
 
     def _ahead(self, time: float, at: ClosedConfiguration) -> tuple[ClosedConfiguration, float] | None:
-        """The rest that attracts and towards which the robot moves, where Newton's method finds one near."""
+        """Return the stable equilibrium towards which the robot moves, if Newton's method finds one near, with its time
+        constant."""
         if time < self.steady:
             return None
         chart = TangentChart.around(at, self.moving)
@@ -139,7 +140,7 @@ class Loop(Value):
             return None
 
     def _shift(self, start: ClosedConfiguration, at: ClosedConfiguration) -> float:
-        """How far the platform has moved (characteristic lengths)."""
+        """Return the displacement of the platform (characteristic lengths)."""
         link = self.law.observation_model.platform
         return float(np.linalg.norm(at.pose(link)[:3, 3] - start.pose(link)[:3, 3])) / at.model.length
 
@@ -229,7 +230,8 @@ class _Stretch:
         return times, states, TIME if until == horizon else None
 
     def _end(self, time: float, y: Array, state: State) -> tuple[str, State] | None:
-        """Why a run with steady, exact directions ends at y (n,), if it does, and the state in which it ends."""
+        """Return the reason for which a run with constant, exact directions ends at y (n,), if it does, and its final
+        state."""
         command = state[1]
         if command.size <= SERVED:
             return SERVED_AT, state
@@ -239,14 +241,15 @@ class _Stretch:
         return (POISED, state) if poised else None
 
     def _rest(self, time: float, y: Array) -> State | None:
-        """The stable rest at which a run has arrived that is at y (n,); None where it is still on its way."""
+        """Return the stable equilibrium that a run at y (n,) has reached; None if it is still moving."""
         found = rest_near(lambda y: self.rate(time, y), y)
         if found is None or np.linalg.norm(found.y - y) > ARRIVED or found.growth > NEUTRAL_GROWTH * self.loop.law.gain:
             return None
         return self.state(time, found.y)
 
     def _stop_reason(self, at: ClosedConfiguration) -> str | None:
-        """What ends a run at a configuration: a joint beyond its limit, something that no camera sees."""
+        """Return the reason for which a run ends at a configuration: a joint beyond its limit, an observation out of
+        view."""
         past = {name: margin - self.least[name] for name, margin in self.stops.margins(at.model, at.q).items()}
         first = min(past, key=past.__getitem__, default=None)
         if first is not None and past[first] < 0:
@@ -265,7 +268,7 @@ class _Stretch:
 
 
 def _loose(at: ClosedConfiguration, start: ClosedConfiguration) -> bool:
-    """Whether the loops lose their rank at a configuration."""
+    """Return True if the loops lose their rank at a configuration."""
     return at.kernel()[1].weakest < LOOPS_LOST * start.kernel()[1].weakest
 
 
@@ -278,13 +281,13 @@ class Standstill(Value):
 
 
 class Patience:
-    """Tells when it is time to look for a rest: once a time constant, where the error persists."""
+    """Timer of the search for an equilibrium: once a time constant, while the error persists."""
 
     def __init__(self, constant: float, time: float, size: float) -> None:
         self.constant, self._time, self._size = constant, time, size
 
     def over(self, time: float, size: float) -> bool:
-        """Whether to look for a rest now."""
+        """Return True if it is time to search."""
         if time - self._time < self.constant:
             return False
         persists = size > PERSISTS * self._size
@@ -293,7 +296,7 @@ class Patience:
 
 
 def rest_near(rate: Callable[[Array], Array], y: Array) -> Standstill | None:
-    """The rest next to y (n,) by Newton's method on ẏ = rate(y); None where none was found near."""
+    """Return the equilibrium next to y (n,) by Newton's method on ẏ = rate(y); None if none was found near."""
     try:
         for _ in range(NEWTON_STEPS):
             steps = REST_SLOPE * np.eye(len(y))

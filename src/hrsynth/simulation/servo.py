@@ -1,4 +1,4 @@
-"""The simulated servo run: from one pose to what is measured at another, and where it ended (MMT 2.3, 5.1.3)."""
+"""Simulated servo run: from one pose to the measured values of another, and its outcome (MMT 2.3, 5.1.3)."""
 
 from __future__ import annotations
 
@@ -43,26 +43,26 @@ from .run import AWAY, EFFORT, LIMIT, UNMEASURED, UNSEEN, Loop, Run
 GAIN = 0.8
 """λ of MMT 5.1.1."""
 LASTS, NOISY_LASTS = 60.0, 16.0
-"""Time constants 1 / λ that a run may take; that it takes where measurements are noisy."""
+"""Duration of a run in time constants 1 / λ: longest one; that with noisy measurements."""
 SETTLED = 0.5
-"""Part of a noisy run after which its errors are counted."""
+"""Fraction of a noisy run after which its errors are counted."""
 OVER = (LIMIT, UNSEEN, UNMEASURED, AWAY)
-"""What ends a run for good: no loop without noise goes on from there."""
+"""Reasons after which the loop without noise does not continue a run."""
 EXACT, EDGES, IMAGES = "exact", "edges", "images"
 ALLOWED_NOISE = {
-    EXACT: "an angle, such as 0.1deg",
-    EDGES: "pixels, such as 0.3px",
-    IMAGES: "none: the images have their own",
+    EXACT: "Give an angle, such as 0.1deg.",
+    EDGES: "Give pixels, such as 0.3px.",
+    IMAGES: "Omit it: the images have their own errors.",
 }
-"""How directions are measured, and the noise of each."""
+"""Methods of measuring directions, and the noise that each takes."""
 DIRECTIONS, ANGLES, PIXELS = ("directions", " degrees"), ("angles", " degrees"), ("image points", " px")
 LENGTHS, VALUES = ("lengths", " mm"), ("values", "")
-"""What is wrong by noise, and its unit."""
+"""Quantities with measurement errors, and their units."""
 
 
 @dataclass(frozen=True)
 class Conditions:
-    """How a robot is servoed; :func:`servo` takes each of these by its name. Raises ``BadRequest``."""
+    """Conditions of a servo run; :func:`servo` takes each of these by its name. Raises ``BadRequest``."""
 
     gain: Annotated[float, option("λ of the control law (1/s).", high=1e6)] = GAIN
     """λ of the control law (1/s)."""
@@ -74,72 +74,74 @@ class Conditions:
             words=("exact", "edges", "images"),
         ),
     ] = EXACT
-    """How what is observed is measured: ``exact`` (or with ``noise``, of directions in a cone about the true ones), of
-    legs also ``edges`` (from those of the legs before a camera, their ends wrong by ``noise``) or ``images`` (from
-    rendered ones)."""
+    """Source of the measured values: ``exact`` (with ``noise``, directions in a cone about the true ones); for leg
+    directions also ``edges`` (of the legs in a camera image, their ends wrong by ``noise``) or ``images`` (edges in
+    rendered images)."""
     noise: Annotated[
-        Noise | str | None, option("Errors of measurements, such as 0.1deg, 0.3px (in images) or 1mm.", "AMOUNT")
+        Noise | str | None, option("Measurement noise, such as 0.1deg, 0.3px (in images) or 1mm.", "AMOUNT")
     ] = None
-    """How wrong it is: angles as ``0.1deg``, what is found in a picture as ``0.3px``, lengths as ``1mm``; or several,
-    as ``0.3px,1mm``."""
+    """Measurement errors: angles as ``0.1deg``, image points as ``0.3px``, lengths as ``1mm``; or several, as
+    ``0.3px,1mm``."""
     bias: Annotated[bool, option("Keep the error of each measurement constant.")] = False
-    """Whether the errors of ``noise`` stay as they are at first."""
+    """Keep the errors of ``noise`` constant."""
     lens: Camera | None = None
-    """The camera of ``edges`` and ``images``, its pose in the link that carries it (default: where it sees all legs
-    well)."""
+    """Camera of ``edges`` and ``images``, its pose in the link that carries it (default: one that sees all legs)."""
     dynamics: Annotated[bool, option("Drive a simulated MuJoCo model with rods, masses and velocity servos.")] = False
-    """Whether a MuJoCo model in MuJoCo is driven, with dynamics."""
+    """Simulate the robot's dynamics in MuJoCo."""
     depth: Depth = "exact"
-    """The depth of what is seen in images, as the law assumes it: ``exact``, ``desired`` (that at the goal) or
+    """Depth of image features that the law assumes: ``exact``, ``desired`` (that at the goal) or
     ``constant:0.5`` (m)."""
     duration: Annotated[
         float | None,
         option("Move the desired measurements along the straight line in this time (default: at once).", "SECONDS"),
     ] = None
-    """Leads the desired values along the straight way of poses in so many seconds instead of at once."""
+    """Time (s) in which the desired values move along the straight path of poses; None: at once."""
     time: Annotated[float | None, option("Longest duration of the run.", "SECONDS")] = None
-    """Longest run (s)."""
+    """Longest duration (s)."""
 
     def __post_init__(self) -> None:
         noise = Noise.read(self.noise)
         if self.bias and noise is None:
-            raise BadRequest("a bias without noise", "none", "an amount of noise, such as 0.1deg")
+            raise BadRequest("--bias: no noise is given", remedy="Give an amount, such as --noise 0.1deg.")
         if noise is not None:
             noise = replace(noise, bias=noise.bias or self.bias)
         object.__setattr__(self, "noise", noise)
         if self.sense not in ALLOWED_NOISE:
-            raise BadRequest("sense", self.sense, tuple(ALLOWED_NOISE))
+            raise BadRequest("--sense", self.sense, tuple(ALLOWED_NOISE))
         units = () if noise is None else tuple(unit for unit, _ in noise.amounts)
         if noise is not None and (self.sense == IMAGES or (self.sense == EDGES and units != ("px",))):
-            raise BadRequest(f"noise with sense {self.sense}", str(noise), ALLOWED_NOISE[self.sense])
+            raise BadRequest(
+                f"--noise {noise}: not possible with --sense {self.sense}", remedy=ALLOWED_NOISE[self.sense]
+            )
         for what, value in (("gain", self.gain), ("duration", self.duration)):
             if value is not None and not 0 < value < math.inf:
-                raise BadRequest(what, value, "a positive number")
+                raise BadRequest(f"--{what}", value, "a positive number")
         if self.duration is not None and self.duration > LONGEST_RUN:
-            raise BadRequest("duration", self.duration, f"at most {LONGEST_RUN:g} seconds")
+            raise BadRequest("--duration", self.duration, f"at most {LONGEST_RUN:g} s")
         if self.time is not None and not 0 < self.time < math.inf:
-            raise BadRequest("time", self.time, "a positive number of seconds")
+            raise BadRequest("--time", self.time, "a positive number of seconds")
         if self.horizon > LONGEST_RUN and (self.noisy or self.dynamics):
             raise BadRequest(
-                "seconds of a run with noise or dynamics",
+                "duration in s of a run with noise or dynamics",
                 self.horizon,
-                f"at most {LONGEST_RUN:g}: a shorter time, a larger gain",
+                f"at most {LONGEST_RUN:g}",
+                remedy="Choose a shorter --time or a larger --gain.",
             )
 
     @property
     def amount(self) -> Noise | None:
-        """The parsed noise."""
+        """Parsed noise."""
         assert not isinstance(self.noise, str)
         return self.noise
 
     @property
     def noisy(self) -> bool:
-        """Whether measured directions are wrong."""
+        """Return True if measurements have errors."""
         return self.sense != EXACT or self.noise is not None
 
     @property
     def horizon(self) -> float:
-        """How long a run may take (s)."""
+        """Longest duration of the run (s)."""
         lasts = NOISY_LASTS if self.noisy or self.dynamics else LASTS
         return self.time or (self.duration or 0.0) + lasts / self.gain
 
@@ -160,23 +162,51 @@ def servo(
     *,
     sensor: SeeLike = None,
     start: StartPose,
-    goal: Annotated[PoseLike, option("Pose whose measurements are desired.", "POSE")],
+    goal: Annotated[PoseLike, option("Pose whose measured values are desired.", "POSE")],
     conditions: Conditions,
     seed: Seed = 0,
 ) -> Servo:
-    """A simulated servo run on what is observed: where it ends, and what it passes on the way.
+    """Simulate a run of the servo loop: its outcome, and the singularities that it crosses.
 
-    The servo loop of MMT 2.3 from the pose ``start`` towards what is measured at ``goal``.
+    Parameters
+    ----------
+    robot
+        Robot, file or name.
+    observe, camera, sensor
+        Observations, as for ``derive``; each kind of observation has its own error.
+    start
+        Start pose (m, rad, in the base frame).
+    goal
+        Pose whose measured values are desired (m, rad, in the base frame).
+    conditions
+        Fields of :class:`Conditions`, given by name: ``gain``, ``sense``, ``noise``, ``bias``, ``lens``,
+        ``dynamics``, ``depth``, ``duration``, ``time``.
+    seed
+        Seed of samples and noise.
 
-    ``observe``, ``camera`` and ``sensor`` are as for ``derive``; each kind of observation has its error. The fields of
-    :class:`Conditions` can be given by their names: ``gain``, ``sense``, ``noise``, ``bias``, ``lens``, ``dynamics``,
-    ``depth``, ``duration``, ``time``.
+    Returns
+    -------
+    Servo
+        Run, outcome and crossings.
 
-    Raises ``BadRequest`` for unknown names, observations that do not see the platform, singular poses and those at
-    which something is behind its camera; ``PoseNotReached`` for poses out of reach; ``MissingExtra``.
+    Raises
+    ------
+    BadRequest
+        Unknown name, a platform dof that is not observed, a singular pose, or a feature behind its camera.
+    PoseNotReached
+        Start or goal is out of reach.
+    MissingExtra
+        An optional package is not installed.
 
+    Notes
+    -----
+    The law is q̇ = −λ B (L U B)⁺ e, B a basis of the motions of the closed loops, U B the rates of the measured values
+    (MMT 2.3.2, eqs. 9-12; docs/pages/proofs.md, section 11).
+
+    Examples
+    --------
     >>> hrsynth.servo("3rrr_m1", start="x=0,y=0,phi=0", goal="x=0.02,y=0,phi=0", gain=0.8)
-    <Servo: 3rrr_m1, watching 1, 2, 3: ended at x=0.02,y=0,z=0,phi=0deg, goal>
+    <Servo: 3rrr_m1, observing 1, 2, 3: goal at x=0.02,y=0,z=0,phi=0deg>
     """
     setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed)
     if conditions.dynamics or conditions.sense != EXACT:
@@ -188,7 +218,7 @@ def servo(
 
 @dataclass(frozen=True, eq=False)
 class ServoTask:
-    """A robot that is about to be servoed: its start and goal configurations, its law, what is desired."""
+    """Task of a servo run: start and goal configurations, control law, desired values."""
 
     setup: ObservedRobot
     start: ClosedConfiguration
@@ -208,7 +238,7 @@ class ServoTask:
         conditions: Conditions = Conditions(),
         seed: int = 0,
     ) -> ServoTask:
-        """The task of a request; raises what :func:`servo` raises."""
+        """Build the task of a request; raises what :func:`servo` raises."""
         wanted = [asked_pose(each) for each in (start, goal)]
         setup = setup.telling(wanted)
         require_seen(setup)
@@ -224,7 +254,7 @@ class ServoTask:
         conditions: Conditions = Conditions(),
         seed: int = 0,
     ) -> ServoTask:
-        """The same between two configurations."""
+        """Build the task between two configurations."""
         require_seen(setup)
         motion, ends = setup.motion, [start, goal]
         observation_model = setup.samples.observation_model
@@ -244,16 +274,16 @@ class ServoTask:
 
     @property
     def wanted(self) -> tuple[Array, ...]:
-        """The values of the goal."""
+        """Values at the goal."""
         return measure_all(self.goal, self.law.observation_model)[0]
 
     @property
     def directions(self) -> Array:
-        """The same where all are directions, (k, 3)."""
+        """Desired directions (k, 3), if all are directions."""
         return np.array(self.wanted)
 
     def run(self) -> Servo:
-        """What comes of it."""
+        """Simulate the run."""
         given = self.conditions
         sensed = self.sense() if given.noisy else None
         loop = self.loop(sensed, smooth=not given.noisy or (given.amount is not None and given.amount.bias))
@@ -262,7 +292,7 @@ class ServoTask:
         return self.result(*DynamicSimulation.of(self.setup, self.start).run(loop, given.horizon))
 
     def loop(self, sensed: Sense | None = None, smooth: bool = True) -> Loop:
-        """The closed loop with what is sensed, smoothly or not."""
+        """Return the closed loop with a sensor, whose errors are smooth or not."""
         return Loop(
             self.law,
             self.setup.all_samples.observation_model,
@@ -273,7 +303,7 @@ class ServoTask:
         )
 
     def sense(self) -> Sense:
-        """What measures, and how wrong."""
+        """Return the sensor with its errors."""
         given, observation_model = self.conditions, self.law.observation_model
         noise = given.amount
         if given.sense == EXACT and noise is not None:
@@ -290,12 +320,13 @@ class ServoTask:
         return RenderedImages(LegRenderer(mechanism, eye, observation_model.reference, rods))
 
     def result(self, run: Run, simulated: Array | None = None) -> Servo:
-        """What came of a run; ``simulated`` is the displacement (4, 4) of the platform on the dynamic simulation."""
+        """Build the result of a run; ``simulated`` is the displacement (4, 4) of the platform in the dynamic
+        simulation."""
         setup, motion, given = self.setup, self.setup.motion, self.conditions
         still = run
         over = run.stopped in OVER
         if (given.noisy or simulated is not None) and not over:
-            # where the loop without noise and dynamics goes on to: its ending is the one that is told
+            # the loop without noise and dynamics continues from here: its outcome is reported
             still = Loop(self.law, setup.all_samples.observation_model, FixedDirections(self.wanted)).simulate(
                 run.last, LASTS / self.law.gain
             )
@@ -323,16 +354,13 @@ class ServoTask:
         )
 
     def _notes(self, run: Run, still: Run, simulated: Array | None) -> Iterator[str]:
-        """What the run leaves out, and what was measured on the benches."""
+        """Yield notes on what the run ignores, and on what noise and dynamics changed."""
         model = self.goal.model
         for name, at in (("start", self.start), ("goal", self.goal)):
             if beyond := outside(model, at.q):
                 yield f"the {name} is beyond the limits of {', '.join(beyond)}"
         if self.setup.segments and (motors := len(model.actuated_indices())) < self.setup.dof:
-            yield (
-                f"motors for {motors} of the platform's {self.setup.dof} freedoms: "
-                "fewer than the motion that is commanded needs"
-            )
+            yield (f"{motors} motors for {self.setup.dof} platform dof: too few for the commanded motion")
         if run.stopped == EFFORT:
             yield f"the run was stopped after {RUN_EVALUATIONS:,} configurations, at {run.times[-1]:.3g} s"
         if self.conditions.noisy:
@@ -341,10 +369,10 @@ class ServoTask:
             motion, X = self.setup.motion, simulated @ self.start.pose(self.setup.motion.link)
             there = still.last.pose(motion.link)
             apart = 1e3 * float(np.linalg.norm(motion.position(X) - motion.position(there)))
-            yield f"the simulated platform stopped {apart:.2g} mm from there"
+            yield f"the simulated platform stopped {apart:.2g} mm from this pose"
 
     def _wrong(self, run: Run) -> Iterator[str]:
-        """By how much measured values were wrong, in units of the noise; of lines and circles their errors."""
+        """Yield the errors of measured values, in units of the noise; of lines and circles their errors."""
         every, amount = self.setup.observed, self.conditions.amount
         units = [_unit(o, None if amount is None else dict(amount.amounts).keys()) for o in every]
         for kind in dict.fromkeys(unit for unit in units if unit is not None):
@@ -354,7 +382,7 @@ class ServoTask:
             ) * (self.goal.model.length if kind == LENGTHS else 1.0)
             rms = ", ".join(f"{value:.2g}" for value in np.sqrt(np.mean(off**2, axis=0)))
             word, unit = kind
-            yield f"measured {word} were wrong by {rms}{unit} root mean square, at most {off.max():.2g}{unit}"
+            yield f"errors of the measured {word}: {rms}{unit} root mean square, at most {off.max():.2g}{unit}"
 
     def _scatter(self, run: Run, settled: ClosedConfiguration) -> Scatter:
         motion = self.setup.motion
@@ -379,18 +407,18 @@ class ServoTask:
 
 
 def require_seen(setup: ObservedRobot) -> None:
-    """Raise ``BadRequest`` where the observed legs do not see all of the platform's freedoms."""
+    """Raise ``BadRequest`` unless all platform dof are observed."""
     sees_all(setup, "")
     if any(member.relation.RI for member in setup.samples.members):
         raise BadRequest(
-            f"{setup.robot.name}: observed links move while the platform rests, there is no interaction matrix",
+            f"{setup.robot.name}: observed links can move while the platform is fixed, so no interaction matrix exists",
             ", ".join(setup.labels),
-            "other legs",
+            remedy="Observe other legs.",
         )
 
 
 def _unit(seen: Observation, noise: Set[str] | None) -> tuple[str, str] | None:
-    """In what it is told how wrong a measured value is; None where it is exact."""
+    """Return the quantity and unit of an observation's measurement error; None if it is exact."""
     own = seen.found_by if noise is None else seen.found_by & noise
     if not own:
         return None
@@ -404,7 +432,7 @@ def _unit(seen: Observation, noise: Set[str] | None) -> tuple[str, str] | None:
 
 
 def _off(kind: tuple[str, str], seen: Observation, value: Array, true: Array) -> float:
-    """How far a measured value is off the true one, lengths over a characteristic length."""
+    """Return the deviation of a measured value from the true one, lengths over a characteristic length."""
     if kind in (DIRECTIONS, ANGLES) and seen.size == 3:
         return math.degrees(np.arccos(np.clip(value @ true, -1, 1)))
     off = float(np.linalg.norm(seen.error(value, true)))
@@ -415,12 +443,12 @@ def _off(kind: tuple[str, str], seen: Observation, value: Array, true: Array) ->
 
 
 def _name_ends(ends: Sequence[ClosedConfiguration]) -> list[tuple[str, ClosedConfiguration]]:
-    """The start and the goal with their names; the goal alone where both are one."""
+    """Return the start and the goal with their names; the goal alone if both are one."""
     return list(zip(("start", "goal"), ends, strict=True))[ends[0] is ends[1] :]
 
 
 def require_sight(setup: ObservedRobot, law: Law, name: str, at: ClosedConfiguration) -> None:
-    """Raise ``BadRequest`` where something that a camera is to see is behind it, or outside of its picture."""
+    """Raise ``BadRequest`` if an observed feature is behind its camera, or outside of its image."""
     for seen in setup.observed:
         X = at.pose(seen.seen_from or law.observation_model.reference)
         if seen.in_front(X, at.pose(seen.link)) < SEEN_ABOVE:
@@ -433,11 +461,11 @@ def require_sight(setup: ObservedRobot, law: Law, name: str, at: ClosedConfigura
 
 
 def require_regular(analysis: ConfigurationAnalysis, name: str, at: ClosedConfiguration) -> None:
-    """Raise ``BadRequest`` where a pose is singular."""
+    """Raise ``BadRequest`` if a pose is singular."""
     posture = analysis.classify(at)
     robot, pose = analysis.setup.robot.name, str(posture.pose)
     if posture.hidden.state == UNDECIDED:
         raise RankUndecided(f"{robot} at the {name} {pose}", posture.hidden.gap, RANK_GAP)
     if posture.hidden.state != REGULAR:
         kind = {"type1": "a Type 1", "type2": "a Type 2", "type3": "a Type 3"}.get(posture.hidden.state, "a constraint")
-        raise BadRequest(f"{robot}: the {name} is {kind} singularity", pose, "a regular pose")
+        raise BadRequest(f"{robot}: the {name} is {kind} singularity", pose, remedy="Choose a regular pose.")

@@ -33,7 +33,7 @@ def judge(case: Case, told: Any) -> None:
     if start is None or items is None:
         case.say("ending", UNCLEAR, "the start is not known here")
         return
-    if told.outcome not in ("goal", "mode", "antipodal"):
+    if told.outcome not in ("goal", "assembly mode", "antipodal"):
         case.say("ending", SILENT, told.outcome)
         return
     found = run(case, items, start, np.asarray(told.desired, dtype=float), float(told.gain))

@@ -408,9 +408,7 @@ def test_what_an_ascent_attains_lies_between_the_two_bounds(name: str):
 def test_a_grid_says_that_parts_of_its_poses_depend_on_each_other() -> None:
     """Roll and pitch of a 3-RPS decide its yaw (Huang); three coordinates of its point that are too far do not depend,
     nor do two of a five-bar's."""
-    with pytest.raises(
-        NoReachablePose, match="3 freedoms, and at zero and at a random configuration parts of these poses"
-    ):
+    with pytest.raises(NoReachablePose, match="3 dof, and at zero and at a random configuration parts of these poses"):
         accuracy(load("3rps"), cone=CONE, grid="z=0.3:0.4:3,rpy=0.1/0.05/0")
     for robot, grid in (("3rps", "x=5:6:3,y=5,z=0.9"), ("rrrrr_m1", "x=50:60:3,y=50")):
         with pytest.raises(NoReachablePose) as refused:

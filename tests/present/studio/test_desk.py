@@ -245,7 +245,7 @@ def test_a_servo_run_aims_at_the_configuration_that_was_set():
     goal = ask("modes", "3rrr_m1")["modes"][1]["here"]
     found = ask("servo", "3rrr_m1", end=goal)
     there = ask("servo", "3rrr_m1", here=goal, end=goal)
-    assert found["kind"] == "mode"
+    assert found["kind"] == "assembly mode"
     assert there["kind"] == "goal"
     assert len(found["frames"]) >= 1
     open_ = {**goal, "q": [value + 0.1 for value in goal["q"]]}

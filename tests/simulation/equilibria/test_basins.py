@@ -369,7 +369,7 @@ def test_other_robots_are_simulated_one_by_one():
 @pytest.mark.parametrize(
     ("asked", "word"),
     [
-        ({"plane": "z=-0.7", "grid": "x=0:0.1:2"}, "both"),
+        ({"plane": "z=-0.7", "grid": "x=0:0.1:2"}, "cannot be combined with --plane"),
         ({"grid": "x=0:1:400,y=0:1:400"}, "160000"),
         ({"jobs": 0, "grid": "x=0:0.1:2"}, "jobs"),
     ],
@@ -417,7 +417,7 @@ def test_a_goal_behind_the_camera_is_told_to_be_the_goal():
 
 def test_why_runs_are_simulated_one_by_one_is_told():
     seen = hrsynth.observe("gough_stewart", camera="eye=base@0,0,-0.6", sensor=POINTS)
-    assert module.hindrances(seen) == ("observations of kind point are fed back",)
+    assert module.hindrances(seen) == ("observations of kind point",)
     assert module.hindrances(ObservedRobot.of("rrrrr_m1")) == ("a leg has no closed form",)
     assert module.hindrances(ObservedRobot.of("3rrr_m1")) == ()
 
@@ -446,9 +446,12 @@ def test_the_legend_has_the_marks_that_are_drawn_and_no_others():
     near[0, 3] += 0.01
     far[0, 3] += 1.0
     for X, told in ((near, True), (far, False)):
-        ends = (goal, *(replace(goal, run_outcome=RunOutcome("boundary", "a leg is stretched"), X=X) for _ in range(7)))
+        ends = (
+            goal,
+            *(replace(goal, run_outcome=RunOutcome("limit reached", "a leg is stretched"), X=X) for _ in range(7)),
+        )
         drawn = picture(replace(found, ends=ends), replace(PNG, ending=".svg")).decode()
-        assert (ENDS["boundary"] in drawn) is told
+        assert (ENDS["limit reached"] in drawn) is told
         assert ENDS["goal"] in drawn
         shades = np.array([to_rgb(each) for each in colours(ends)])
         apart = np.abs(shades[:, None] - shades).max(axis=2) + np.eye(len(ends))
@@ -457,5 +460,5 @@ def test_the_legend_has_the_marks_that_are_drawn_and_no_others():
 
 
 def test_starts_out_of_reach_are_refused():
-    with pytest.raises(NoReachablePose, match="none of 2"):
+    with pytest.raises(NoReachablePose, match="2 were tried"):
         hrsynth.basins("3rrr_m1", goal="x=0,y=0,phi=0", grid="x=5:6:2,y=0,phi=0")

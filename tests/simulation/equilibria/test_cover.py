@@ -43,9 +43,7 @@ STEP = 1e-6
 def levels(error, modes, x):
     """Whether all legs reach (n,), and E, at coordinates (n, size), in some working modes, to the directions in those
     of the goal."""
-    other = replace(
-        error, limbs=tuple(replace(limb, mode=mode) for limb, mode in zip(error.subchains, modes, strict=True))
-    )
+    other = replace(error, limbs=tuple(replace(limb, mode=mode) for limb, mode in zip(error.limbs, modes, strict=True)))
     with np.errstate(all="ignore"):
         own, there = (
             np.array(
@@ -465,7 +463,7 @@ def test_only_short_places_are_told_as_ones_that_lock(monkeypatch):
 
     def made(part, *_):
         ways = [0.0] if part.error.far is None else [-0.1, 0.1] if part.error.far else [0.0]
-        part.unobserved += [(np.full(len(part.whole), way), 1e-5 * part.whole) for way in ways]
+        part.lost += [(np.full(len(part.whole), way), 1e-5 * part.whole) for way in ways]
 
     monkeypatch.setattr(Subdivision, "run", made)
     found = cover(setup, setup.all_samples.start)
@@ -476,7 +474,7 @@ def test_only_short_places_are_told_as_ones_that_lock(monkeypatch):
 
     def chain(part, *_):
         if part.error.far is None:
-            part.unobserved += [(way * part.whole, 1e-2 * part.whole) for way in np.arange(-0.5, 0.5, 0.01)]
+            part.lost += [(way * part.whole, 1e-2 * part.whole) for way in np.arange(-0.5, 0.5, 0.01)]
 
     monkeypatch.setattr(Subdivision, "run", chain)
     monkeypatch.setattr(Subdivision, "cut_lost", lambda *_: None)
@@ -546,7 +544,7 @@ def test_a_rest_beside_a_place_that_locks_is_one_zero(p: tuple[float, ...], fall
 def exact_level(error, y):
     """E in many digits for cranks, as a function of the pose's coordinates, in the working modes of joints y."""
     legs = []
-    for limb, angle, wanted in zip(error.subchains, y[error.size :], JointError.of(error).wanted, strict=True):
+    for limb, angle, wanted in zip(error.limbs, y[error.size :], JointError.of(error).wanted, strict=True):
         one, two = (mpmath.matrix(each.tolist()) for each in across(limb))
         legs.append((limb, one, two, mpmath.matrix(np.asarray(wanted, dtype=float).tolist()), angle))
 
@@ -696,12 +694,12 @@ def test_progress_claims_no_more_than_is_settled(monkeypatch: pytest.MonkeyPatch
             return middle[-1:], half[-1:], np.zeros(1, dtype=np.intp)
 
     told: list[str] = []
-    monkeypatch.setattr("hrsynth.simulation.equilibria.subdivision.tell", told.append)
+    monkeypatch.setattr("hrsynth.simulation.equilibria.subdivision.report", told.append)
     Halved(None, -np.ones(2), np.ones(2)).run(12, 1, 3)  # type: ignore[arg-type]
     assert told[:3] == [
-        "boxes of search 2 of 3: 0 % of the space settled, 0 looked at of at most 12, 1 waiting",
-        "boxes of search 2 of 3: 0 % of the space settled, 1 looked at of at most 12, 2 waiting",
-        "boxes of search 2 of 3: 50 % of the space settled, 3 looked at of at most 12, 2 waiting",
+        "boxes of search 2 of 3: 0 % of the space settled, 0 processed of at most 12, 1 waiting",
+        "boxes of search 2 of 3: 0 % of the space settled, 1 processed of at most 12, 2 waiting",
+        "boxes of search 2 of 3: 50 % of the space settled, 3 processed of at most 12, 2 waiting",
     ]
     settled = 100 * (1 - 0.5 ** (len(told) - 2))
     assert told[-1].startswith(f"boxes of search 2 of 3: {int(settled)} % of the space settled")

@@ -66,7 +66,7 @@ def drawn(error, rng, count=4):
     p, R = error.pose(y)
     found = rods(error.error.length * p, R)
     for i in range(3):
-        limb = error.error.subchains[i]
+        limb = error.error.limbs[i]
         one = np.linalg.svd(limb.axis[None])[2][1]
         two = np.cross(limb.axis, one)
         either = np.pi * rng.integers(2, size=count)

@@ -229,7 +229,7 @@ def test_a_goal_that_the_directions_do_not_see_is_undecided():
     setup = ObservedRobot.of("quattro", "1")
     found = certified_radius(setup, setup.all_samples.start)
     assert found.verdict == UNDECIDED
-    assert "do not see" in found.words
+    assert "do not determine" in found.words
 
 
 def test_where_joints_have_limits_nothing_is_certified():
@@ -239,7 +239,7 @@ def test_where_joints_have_limits_nothing_is_certified():
     setup = ObservedRobot.of(replace(robot, joints={**robot.joints, "shoulder_1": joint}))
     found = certified_radius(setup, setup.all_samples.start)
     assert found.verdict == UNDECIDED
-    assert found.words.endswith("limits of joints: shoulder_1")
+    assert found.words.endswith("joint limit: shoulder_1")
 
 
 @pytest.mark.long

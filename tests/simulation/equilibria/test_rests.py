@@ -157,7 +157,7 @@ def test_the_order_of_rests_is_that_of_what_they_are():
     found, rng = listed(), np.random.default_rng(0)
     rests, link, length = [*found.equilibria, *found.singular], found.setup.motion.link, found.goal.model.length
     ordered = _sort(rests, link, length)
-    assert [*dict.fromkeys(each.kind for each in ordered)] == ["goal", "mode", "antipodal", "critical"]
+    assert [*dict.fromkeys(each.kind for each in ordered)] == ["goal", "assembly mode", "antipodal", "critical"]
     for _ in range(20):
         other = [
             replace(rests[i], error=rests[i].error * (1 + 1e-9 * rng.normal()) + 1e-14 * rng.random())
@@ -349,11 +349,11 @@ def test_of_one_pose_the_enclosed_rest_is_told() -> None:
     beside nothing that said *mode* (quattro, legs 1 and 4, z = −0.7)."""
     found = listed()
     search = EquilibriumSearch.of(found.setup, found.goal)
-    for mode in (each for each in found.points if each.kind == "mode"):
+    for mode in (each for each in found.points if each.kind == "assembly mode"):
         vague = replace(mode, kind="critical", error=4e-7, shift=np.inf, turn=np.inf, decided=False)
         for both in ([vague, mode], [mode, vague]):
             (told,) = _ways(both, search)
-            assert (told.kind, told.proved, told.working_modes) == ("mode", True, 2)
+            assert (told.kind, told.proved, told.working_modes) == ("assembly mode", True, 2)
 
 
 @pytest.mark.slow
@@ -606,7 +606,7 @@ def pulled(x: np.ndarray, at: np.ndarray, wanted: np.ndarray) -> np.ndarray:
 def test_four_image_points_of_a_tilted_square(tmp_path: Path) -> None:
     """The goal and the pose tilted the other way attract, a saddle lies between them; by hand they are rests, gradient
     descent in maximal coordinates ends at them alone, and zeros of the gradient by least squares are no others."""
-    found = body(tmp_path, seen(SQUARE), at=TILTED)
+    found = body(tmp_path, seen(SQUARE), goal=TILTED)
     poses = [each.configuration.pose("platform") for each in found.points]
     p = SQUARE @ poses[0][:3, :3].T + poses[0][:3, 3]
     wanted = p[:, :2] / p[:, 2:]
@@ -644,7 +644,7 @@ def test_four_image_points_of_a_tilted_square(tmp_path: Path) -> None:
 
 @pytest.mark.some(0, 1)
 @pytest.mark.parametrize(
-    "see",
+    "sensor",
     [
         ["circle:platform@0.1,0,0/0,0.3,1", "distance:platform@0.1,0.1,0"],
         ["edges:platform@0.1,0,0/0,1,0.2/0.02", "edge:platform@0.1,0.1,0/1,0,0/0.02"],
@@ -654,7 +654,7 @@ def test_four_image_points_of_a_tilted_square(tmp_path: Path) -> None:
 )
 def test_rests_of_all_kinds_are_those_of_the_law(sensor: list[str], tmp_path: Path) -> None:
     """The law commands nothing there, and from next to one that attracts a run ends at it."""
-    found = body(tmp_path, sensor, at=TILTED)
+    found = body(tmp_path, sensor, goal=TILTED)
     assert found.points[0].kind == "goal"
     assert all(each.stable and each.proved for each in found.points if each.error < 1e-9)
     search = EquilibriumSearch.of(found.setup, found.goal)
@@ -677,7 +677,7 @@ def test_rests_of_all_kinds_are_those_of_the_law(sensor: list[str], tmp_path: Pa
 def test_rests_with_supposed_depths_are_those_of_the_law(depth: str, mixed: bool, tmp_path: Path) -> None:
     """There the law commands nothing, and its differences have the eigenvalues that are told."""
     sensor = ["image_line:platform@0.1,0,0/0,1,0", "distance:platform@0,0.1,0"] if mixed else []
-    found = body(tmp_path, seen(SQUARE[: 3 if mixed else 4]) + sensor, at=TILTED, depth=depth)
+    found = body(tmp_path, seen(SQUARE[: 3 if mixed else 4]) + sensor, goal=TILTED, depth=depth)
     search = EquilibriumSearch.of(found.setup, found.goal, depth)
     assert found.points[0].kind == "goal"
     assert not any(each.proved for each in found.points)
@@ -695,8 +695,8 @@ def test_rests_with_supposed_depths_are_those_of_the_law(depth: str, mixed: bool
 
 def test_what_cannot_be_asked_of_cameras_is_refused_in_one_line(tmp_path: Path) -> None:
     for options, said in (
-        ({"at": "x=0,y=0,z=-0.5,rpy=0/0/0"}, "not in front of its camera at the goal"),
-        ({"at": TILTED, "complete": True}, "knows directions of segments only"),
+        ({"goal": "x=0,y=0,z=-0.5,rpy=0/0/0"}, "not in front of its camera at the goal"),
+        ({"goal": TILTED, "complete": True}, "knows directions of segments only"),
     ):
         with pytest.raises(BadRequest, match=said):
             body(tmp_path, seen(SQUARE), **options)

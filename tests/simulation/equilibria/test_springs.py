@@ -33,14 +33,14 @@ def random_error(seed):
     rng, error = np.random.default_rng(seed), of_robot()
     limbs = [
         replace(limb, centre=rng.normal(size=3), tip=replace(limb.tip, turned=rng.normal(size=3)))
-        for limb in error.subchains
+        for limb in error.limbs
     ]
     return replace(error, limbs=tuple(limbs), p=rng.normal(size=3), R=turned(rng.normal(size=3)))
 
 
 def geometry(error):
     """Base points, points of the platform, desired directions (3, 3), by hand."""
-    limbs = [error.subchains[each.limb] for each in error.seen]
+    limbs = [error.limbs[each.limb] for each in error.seen]
     a, b = np.array([each.centre for each in limbs]), np.array([each.tip.turned for each in limbs])
     rods = error.p + b @ error.R.T - a
     return a, b, rods / np.linalg.norm(rods, axis=1)[:, None]
@@ -219,11 +219,11 @@ def test_rests_that_a_leg_does_not_reach_are_left_out(rod: float, rests: int, bo
     """The goal of the Gough-Stewart platform, a leg that is not watched being a crank with a rod, which lies within its
     reach, beyond it, or stretched; that is left open."""
     error = of_robot()
-    idle = next(i for i in range(len(error.subchains)) if i not in {each.limb for each in error.seen})
-    tip = error.subchains[idle].tip
+    idle = next(i for i in range(len(error.limbs)) if i not in {each.limb for each in error.seen})
+    tip = error.limbs[idle].tip
     place = error.p + error.R @ tip.turned
     crank = OnCrank("", tip, centre=place - [0.5, 0.0, 0.0], axis=np.array([0.0, 0.0, 1.0]), radius=0.2, rod=rod)
-    limbs = [crank if i == idle else limb for i, limb in enumerate(error.subchains)]
+    limbs = [crank if i == idle else limb for i, limb in enumerate(error.limbs)]
     chart, y = coordinates(replace(error, limbs=tuple(limbs)), error.p, error.R)
     part = SpringSubdivision(chart, y - 0.001, y + 0.0012)
     part.run(1000)
@@ -236,7 +236,7 @@ def test_rests_half_a_turn_apart_are_two() -> None:
     """Two balls lie on an axis through the platform's point, the third rod meets it at right angles: half a turn about
     it from the goal is another mode, with the same point and the same directions but for signs."""
     error, boxes = random_error(3), list[CriticalBox]()
-    limbs, R = list(error.subchains), error.R
+    limbs, R = list(error.limbs), error.R
     for each, arm in zip(error.seen, ([0.3, 0.0, 0.0], [-0.4, 0.0, 0.0], [0.1, 0.5, 0.0]), strict=True):
         limb = limbs[each.limb]
         limbs[each.limb] = replace(
@@ -261,7 +261,7 @@ def test_rests_half_a_turn_apart_are_two() -> None:
 def test_words_except_legs_without_a_length() -> None:
     """Where rests are those of springs, legs that are not watched may be telescopic ones."""
     told = CompletenessReport(SubdivisionResult((), (), 0.0, 10, True, loop=SpringError.about(of_robot())), (), 0, None)
-    found: Any = SimpleNamespace(cover=told, setting=scenes.setting("gough_stewart", ("1", "3", "5")))
+    found: Any = SimpleNamespace(subdivision=told, setup=scenes.setting("gough_stewart", ("1", "3", "5")))
     assert "leg 2 or 4 or 6 is stretched or has no length, or a watched direction is" in _complete(found)[0]
 
 
@@ -277,13 +277,13 @@ def test_a_zero_may_be_another_than_that_of_a_box() -> None:
 def test_other_watched_legs_are_refused() -> None:
     """Four rods that slide, or three whose desired directions lie in a plane."""
     at = scenes.goal("gough_stewart")
-    with pytest.raises(NotEnclosed, match="not three rods"):
+    with pytest.raises(NotEnclosed, match="not three sliding rods"):
         SpringError.about(PoseError.of(scenes.setting("gough_stewart", ("1", "2", "3", "5")), at))
     error = of_robot()
-    first = error.subchains[error.seen[0].limb]
+    first = error.limbs[error.seen[0].limb]
     same = [
         replace(limb, centre=first.centre, tip=first.tip) if i == error.seen[1].limb else limb
-        for i, limb in enumerate(error.subchains)
+        for i, limb in enumerate(error.limbs)
     ]
     with pytest.raises(NotEnclosed, match="plane"):
         SpringError.about(replace(error, limbs=tuple(same)))

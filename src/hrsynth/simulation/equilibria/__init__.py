@@ -1,1 +1,1 @@
-"""Every ending of the loop: the poses at which it can rest, which of them attract, and from where."""
+"""Equilibria of the servo loop: where they are, which are stable, and their basins of attraction."""

@@ -1,4 +1,4 @@
-"""The certified radius: from how far around a goal every start is proved to end there (docs/pages/proofs.md).
+"""Proved attraction radius of a goal (docs/pages/proofs.md, section 14).
 
 In cones about the goal the error E = ½‖e‖² is proved to rise along every ray until it is at least c. Then no run, along
 which E falls, leaves the component of {E < c} that holds the goal; the goal is its only critical point; and all starts
@@ -34,12 +34,14 @@ CERTIFIED, UNDECIDED = "certified", "undecided"
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CertifiedRadius(Value):
-    """What is proved of the starts about a goal, in its working mode: from platform positions within ``length`` (m)
-    and, where it turns, turns within ``angle`` (rad) of the goal's (both at once) every run ends at the goal.
+    """Proved attraction radius of a goal, in its working mode: every run that starts with the platform position within
+    ``length`` (m) and, if the platform rotates, its rotation within ``angle`` (rad) of the goal's (both at once) ends
+    at the goal.
 
-    ``level`` is c, ``least`` a lower bound of ‖∇E‖ / |x|, x the pose from the goal's (characteristic lengths, halves of
-    tangents of half the turn); ``boxes`` were tried. Where nothing is certified ``reason`` says why; ``limits`` are
-    joints whose limits are not looked at."""
+    ``level`` is c, ``least`` a lower bound of ‖∇E‖ / |x|, x the pose relative to the goal (characteristic lengths,
+    halves of tangents of half the rotation); ``boxes`` were tried. If nothing is proved, ``reason`` gives the cause;
+    ``limits`` are joints whose limits are ignored.
+    """
 
     goal: ClosedConfiguration
     motion: PlatformMotion
@@ -50,19 +52,19 @@ class CertifiedRadius(Value):
     boxes: int
     reason: str
     undamped: float = 0.0
-    """The same of the law where it is not damped (characteristic lengths, radians)."""
+    """Radius while the law is not damped (characteristic lengths, radians)."""
     aside: bool = False
-    """Whether positions are those of another point of the platform than the one that its poses tell."""
+    """Flag: positions are of another platform point than that of the printed poses."""
 
     @property
     def verdict(self) -> str:
-        """Certified, or undecided."""
+        """Return certified, or undecided."""
         return CERTIFIED if self.length > 0 else UNDECIDED
 
     @property
     @recorded()
     def words(self) -> str:
-        """From where every start ends at the goal."""
+        """Starts from which every run ends at the goal, in words."""
         if not self.length:
             return f"undecided: {self.reason}"
         return f"from anywhere {self._within(self.length, self.angle)}"
@@ -70,7 +72,7 @@ class CertifiedRadius(Value):
     @property
     @recorded(As("undamped"))
     def undamped_words(self) -> str | None:
-        """From where, as long as the law is not damped; None where that is not farther."""
+        """Starts from which every run ends at the goal while the law is not damped; null if these are no more."""
         length = self.goal.model.length * self.undamped
         if length <= self.length:
             return None
@@ -79,7 +81,7 @@ class CertifiedRadius(Value):
 
     @property
     def measured(self) -> str:
-        """Which point's positions count, where poses tell another's; else empty."""
+        """Return the point whose position counts, if it is not that of the printed poses; else an empty text."""
         point = " ".join(f"{x:.4g}" for x in self.motion.point)
         return f"measured at the point ({point}) m of {self.motion.link}" if self.aside else ""
 
@@ -89,7 +91,7 @@ class CertifiedRadius(Value):
         return f"within {1e3 * length:.3g} mm{turn} of the goal in its working mode{at}"
 
     def holds(self, X: Array) -> bool:
-        """Whether a platform pose X (4, 4) is one of those starts."""
+        """Return True if a platform pose X (4, 4) is one of those starts."""
         here = self.goal.pose(self.motion.link)
         shift = transform(X, self.motion.point) - transform(here, self.motion.point)
         return bool(
@@ -99,15 +101,15 @@ class CertifiedRadius(Value):
 
 
 def certified_radius(setup: ObservedRobot, goal: ClosedConfiguration) -> CertifiedRadius:
-    """The largest radius that is proved with the budget of boxes, for directions of segments that are watched."""
+    """Return the largest attraction radius proved with the budget of boxes, for observed directions of segments."""
     try:
         if not all(each.by_segment for each in setup.observed):
-            raise NotEnclosed("it is for directions of segments only")
+            raise NotEnclosed("only directions of segments are supported")
         error = PoseError.of(setup, goal)
         if error.fitted:
             raise NotEnclosed(f"forms are fitted to samples: {', '.join(error.fitted)}")
         if error.limits:
-            raise NotEnclosed(f"a run may stop at the limits of joints: {', '.join(error.limits)}")
+            raise NotEnclosed(f"a run may stop at a joint limit: {', '.join(error.limits)}")
         proved = _proved_cones(error)
     except NotEnclosed as why:
         return CertifiedRadius(goal, setup.motion, 0.0, None, 0.0, 0.0, 0, str(why))
@@ -142,13 +144,13 @@ def _product(radius: float) -> float:
 
 
 def _proved_cones(error: PoseError) -> ProvedCones:
-    """Cones proved up to nearly where E is seen to stop rising on some ray; raises ``NotEnclosed``."""
+    """Prove cones nearly up to where E stops rising on some ray; raises ``NotEnclosed``."""
     n = error.size
     _, rates = error.numbers(np.zeros((1, n)), np.eye(n))
     J = rates[0]
     values, V = np.linalg.eigh(J.T @ J)
     if values[0] <= RANK_CUTOFF * values[-1]:
-        raise NotEnclosed("the directions do not see all freedoms at the goal")
+        raise NotEnclosed("the directions do not determine all platform twists at the goal")
     W = V / np.sqrt(values)
     seen = _highest(error, W)
     prover = ConeProver.of(error, W * np.sqrt(2 * seen))
@@ -225,7 +227,8 @@ def _highest_on(errors: BoxFormula, Q: Array, middle: Array, half: Array) -> Aff
 
 
 def _below(error: PoseError, errors: BoxFormula, Q: Array, radius: float, c: float) -> tuple[bool, int]:
-    """Whether E < c is enclosed at all poses within a radius, by boxes that are cut where it is not; their number."""
+    """Return True if E < c is enclosed at all poses within a radius, by boxes that are cut where it is not; with their
+    number."""
     k, n = error.shifts.shape[1], error.size
     whole = np.where(np.arange(n) < k, radius, np.tan(min(radius, 3.0) / 2)) * (1 + FOLLOWED)
 

@@ -1,5 +1,5 @@
-"""Where runs to one goal end, from each start of a line, plane or box of poses: many abreast where the batch knows the
-robot, else one by one."""
+"""Basins of attraction: outcomes of the runs to one goal from each start of a line, plane or box of poses. Runs are
+batched if the closed forms cover the robot, else simulated separately."""
 
 from __future__ import annotations
 
@@ -56,21 +56,20 @@ from .flow import Flags, Flow, Places
 from .outcomes import Outcome, OutcomeCount, Outcomes
 
 SIDE, SIDE_ONE_BY_ONE = 100, 15
-"""Starts along each side of a plane, abreast and one by one."""
+"""Starts along each side of a plane: batched, and simulated separately."""
 REGION, REGION_SIDE = 1.1, (0, 401, 81, 25)
-"""Half the width over which what is certified is drawn, in its radii, and the poses along each side, by the number of
-parts that vary."""
+"""Half the width over which the proved attraction radius is drawn, in radii, and the poses along each side, by the
+number of parts that vary."""
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
-"""Names of the ends in text and picture."""
+"""Letters of the outcomes in text and figure."""
 NOT_REACHED = -1
-"""The number of a start at which the robot cannot be."""
+"""Index of a start at which the robot cannot be."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BasinEnd(Value):
-    """Where runs end: the ``ending`` of one of them, simulated separately; the platform's pose X (4, 4) and ‖e‖ if they
-    come to rest at one pose; how many starts, and what share of all, end there; ``example`` is the pose of one of them,
-    as ``servo`` takes it."""
+    """Outcome of some runs, that of one simulated separately; the platform's pose X (4, 4) and ‖e‖ if they converge to
+    one pose; their number and fraction; ``example`` is the pose of one of the starts, as ``servo`` takes it."""
 
     run_outcome: Annotated[RunOutcome, FLAT]
     pose: Recorded[Pose | None]
@@ -84,9 +83,8 @@ class BasinEnd(Value):
 
 
 class CertifiedPart(NamedTuple):
-    """The distance from the goal within which every start in its working mode is proved to end there, and what share of
-    the goal's basin among the starts that covers; the larger distance that holds as long as the law is not damped, if
-    there is one."""
+    """Proved attraction radius: every start in the goal's working mode within this distance is proved to end at the
+    goal; the fraction of the goal's basin that it covers; the larger radius while the law is not damped, if any."""
 
     radius: Annotated[CertifiedRadius, FLAT]
     covered: float
@@ -94,35 +92,47 @@ class CertifiedPart(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Basins(Result, shown_as="basins"):
-    """Where runs from each pose of a grid end: ``cells`` holds the number of the end, in the grid's shape, −1 where the
-    robot cannot start; ``damped`` the starts whose runs meet a singularity, where the law is damped. ``abreast`` says
-    whether they were integrated together; ``followed`` of them were then simulated one by one because that could not
-    continue, and of ``checked`` others ``agreed`` ended at the same pose."""
+    """Outcome of the run from each pose of a grid.
+
+    Attributes
+    ----------
+    ends
+        Outcomes with their poses and numbers of starts.
+    cells
+        Index of the outcome of each start, in the grid's shape; −1 if the robot cannot start there.
+    damped
+        Starts whose runs meet a singularity, where the law is damped.
+    batched
+        Flag: runs were integrated together; ``followed`` of them were then simulated separately because that could not
+        continue, and of ``checked`` others ``agreed`` ended at the same pose.
+    certified
+        Proved attraction radius of the goal.
+    """
 
     setup: Annotated[ObservedRobot, FLAT]
     goal: Recorded[Pose]
     target: ClosedConfiguration
     grid: Grid
     ends: Recorded[tuple[BasinEnd, ...]]
-    cells: Annotated[Places, Table, "numbers of ``ends``, counted from 0, -1 where no run starts"]
+    cells: Annotated[Places, Table, "indices of ``ends``, from 0; -1 where no run starts"]
     damped: Flags
     batched: Recorded[bool]
     followed: Recorded[int] = 0
     checked: Recorded[int] = 0
     agreed: Recorded[int] = 0
     certified: CertifiedRadius | None = None
-    """From how far around the goal every start is proved to end there."""
+    """Proved attraction radius of the goal."""
 
     @property
     @recorded()
     def starts(self) -> int:
-        """At how many poses of the grid the robot can start."""
+        """Number of poses of the grid at which the robot can start."""
         return int(np.sum(self.cells != NOT_REACHED))
 
     @cached_property
     def region(self) -> tuple[Grid, Flags] | None:
-        """Poses of the drawn set around the goal, and which of them are in what is certified; None where none is, or
-        where that is about another point than the one that the set is drawn of."""
+        """Poses around the goal, and which of them are within the proved attraction radius; None if none is, or if the
+        radius is that of another platform point than the drawn one."""
         found = self.certified
         if found is None or not found.length or found.aside:
             return None
@@ -142,7 +152,7 @@ class Basins(Result, shown_as="basins"):
 
     @property
     def covered(self) -> float:
-        """How much of the goal's basin, as far as it is drawn, is certified."""
+        """Return the fraction of the goal's basin, as far as the grid covers it, that is proved."""
         goal = next((i for i, each in enumerate(self.ends) if each.run_outcome.name == GOAL), None)
         if self.region is None or goal is None:
             return 0.0
@@ -153,7 +163,8 @@ class Basins(Result, shown_as="basins"):
         return float(sizes[0] / sizes[1])
 
     def members(self, listed: Equilibria) -> tuple[int | None, ...]:
-        """The place of each end in a list of rests with the same goal; None where it is not on the list, or no rest."""
+        """Return the index of each outcome in a list of equilibria with the same goal; None if it is not on the list,
+        or no equilibrium."""
         length, link = self.target.model.length, self.setup.motion.link
         rests = [(rest.configuration.pose(link), rest.error) for rest in listed.points]
         return tuple(
@@ -171,7 +182,7 @@ class Basins(Result, shown_as="basins"):
         )
 
     def headline(self) -> str:
-        """The robot and what share of the starts ends at the goal."""
+        """Return the robot and the share of the starts that ends at the goal."""
         share = next((each.share for each in self.ends if each.run_outcome.name == GOAL), 0.0)
         return f"{self.setup.headline()}: {100 * share:.3g} % of {self.starts:,} starts end at the goal {self.goal}"
 
@@ -182,7 +193,7 @@ class Basins(Result, shown_as="basins"):
     @property
     @recorded(As("certified"))
     def certified_record(self) -> CertifiedPart | None:
-        """What is certified; None where nothing was sought."""
+        """Proved part; null if no proof was tried."""
         return None if self.certified is None else CertifiedPart(self.certified, self.covered)
 
 
@@ -199,7 +210,7 @@ def basins(
     camera: CameraLike = None,
     *,
     sensor: SeeLike = None,
-    goal: Annotated[PoseLike, option("Pose whose measurements are desired.", "POSE")],
+    goal: Annotated[PoseLike, option("Pose whose measured values are desired.", "POSE")],
     plane: Annotated[
         PoseLike | None,
         option(
@@ -208,7 +219,7 @@ def basins(
     ] = None,
     grid: Annotated[
         str | None,
-        option("A line, plane or box of starts, such as x=-0.3:0.3:50,y=-0.3:0.3:50,z=-0.7 (from:to:count).", "GRID"),
+        option("Line, plane or box of starts, such as x=-0.3:0.3:50,y=-0.3:0.3:50,z=-0.7 (from:to:count).", "GRID"),
     ] = None,
     steps: Annotated[
         int | None,
@@ -220,28 +231,57 @@ def basins(
     depth: Depth = "exact",
     seed: Seed = 0,
 ) -> Basins:
-    """Where the servo loop to a goal ends, from each start of a line, plane or box of poses.
+    """Basins of attraction: the outcome of the servo loop from each start of a line, plane or box of poses.
 
-    Where the loop ends that servoes what is observed at the pose ``goal``, from each start of a plane of poses (by
-    default one through the goal, as far as it is reached, ``steps`` poses a side) or of a ``grid``, a line, plane or
-    box such as ``x=-0.3:0.3:50,y=-0.3:0.3:50,z=-0.7``.
+    Parameters
+    ----------
+    robot
+        Robot, file or name.
+    observe, camera, sensor
+        Observations, as for ``derive``.
+    goal
+        Pose whose measured values are desired (m, rad, in the base frame).
+    plane
+        Plane of start poses, as far as it is reached, with ``steps`` poses a side (default: one through the goal).
+    grid
+        Line, plane or box of start poses, such as ``x=-0.3:0.3:50,y=-0.3:0.3:50,z=-0.7``.
+    steps
+        Number of poses along each side of the plane.
+    jobs
+        Number of processes, by default one per core; the result does not depend on it.
+    depth
+        Depth of image features that the law assumes, as for ``servo``.
+    seed
+        Seed of samples.
 
-    ``observe``, ``camera`` and ``sensor`` are as for ``derive``. The law is that of ``servo`` with exact measurements
-    (and a ``depth``). Robots whose legs have closed forms and are watched by their directions are integrated together,
-    others one by one. There are ``jobs`` processes, by default one per core; the answer does not depend on their
-    number.
+    Returns
+    -------
+    Basins
+        Outcomes, and the index of the outcome of each start, in the shape of the grid.
 
-    Raises ``BadRequest`` for unknown names, legs that do not see the platform, a singular goal, too many starts;
-    ``PoseNotReached``, ``NoReachablePose`` for poses out of reach.
+    Raises
+    ------
+    BadRequest
+        Unknown name, a platform dof that is not observed, a singular goal, or too many starts.
+    PoseNotReached, NoReachablePose
+        The goal, or all starts are out of reach.
 
+    Notes
+    -----
+    The law is that of ``servo`` with exact measurements. Runs of robots whose legs have closed forms are batched if
+    leg directions are observed; other runs are simulated separately. The proved attraction radius is that of
+    docs/pages/proofs.md, section 14.
+
+    Examples
+    --------
     >>> hrsynth.basins("3rrr_m1", goal="x=0,y=0,phi=0", grid="x=-0.02:0.02:5,y=-0.02:0.02:5,phi=0")
-    <Basins: 3rrr_m1, watching 1, 2, 3: 100 % of 25 starts end at the goal x=0,y=0,z=0,phi=0deg>
+    <Basins: 3rrr_m1, observing 1, 2, 3: 100 % of 25 starts end at the goal x=0,y=0,z=0,phi=0deg>
     """
     setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed)
     asked = asked_pose(goal)
     setup = setup.telling([asked])
     if plane is not None and grid is not None:
-        raise BadRequest("basins: both a plane and a grid are given", str(grid), "one of them")
+        raise BadRequest(f"--grid {grid}: cannot be combined with --plane", remedy="Omit one.")
     (target,) = configurations_at(setup, [asked])
     task = ServoTask.between(setup, target, target, Conditions(depth=depth))
     search = BasinSearch(setup, target, task, jobs or os.cpu_count() or 1)
@@ -250,7 +290,7 @@ def basins(
 
 @dataclass(frozen=True, eq=False)
 class BasinSearch:
-    """A goal and the loop that leads to it, of which many starts are followed, in so many processes (``jobs``)."""
+    """Search of the outcomes of many starts of the loop to a goal, by ``jobs`` processes."""
 
     setup: ObservedRobot
     goal: ClosedConfiguration
@@ -259,14 +299,14 @@ class BasinSearch:
 
     @cached_property
     def flow(self) -> Flow | None:
-        """The law abreast; None where something hinders it."""
+        """Batched law; None if something prevents it."""
         setup = self.setup
         if setup.placer is None or hindrances(setup):
             return None
         return Flow(setup.placer, tuple(setup.labels), self.task.directions)
 
     def plane(self, plane: PoseLike | None, steps: int | None) -> Grid:
-        """The poses of a plane that are reached; by default one through the goal."""
+        """Return the reached poses of a plane, by default one through the goal."""
         motion, X = self.setup.motion, self.goal.pose(self.setup.motion.link)
         if plane is not None:
             fixed = as_pose(plane)
@@ -279,16 +319,21 @@ class BasinSearch:
         )
 
     def over(self, grid: Grid, seed: int) -> Basins:
-        """The ends of the runs from all poses of a grid."""
+        """Return the outcomes of the runs from all poses of a grid."""
         name, motion = self.setup.robot.name, self.setup.motion
         most, count = FLOW_STARTS if self.flow else FLOW_STARTS_ONE_BY_ONE, math.prod(grid.shape)
         if count > most:
-            how = "" if self.flow else ", which are simulated one by one"
-            raise BadRequest(f"{name}: number of starts{how}", count, f"at most {most:,}")
+            how = "" if self.flow else ", which are simulated separately"
+            raise BadRequest(
+                f"{name}: number of starts{how}",
+                count,
+                f"at most {most:,}",
+                remedy="Choose fewer --steps or a coarser --grid.",
+            )
         X, possible = poses_over(motion, grid, name, grid.places())
         found = self._abreast(X, possible, seed) if self.flow else self._one_by_one(X, grid)
         if not len(found.outcomes):
-            raise NoReachablePose(name, f"the grid {grid}", f"none of {count} is")
+            raise NoReachablePose(name, f"the grid {grid}", f"{count} were tried")
         counts = np.bincount(found.cells[found.cells != NOT_REACHED], minlength=len(found.outcomes))
         order = sorted(np.flatnonzero(counts), key=lambda i: (ENDINGS.index(found.outcomes[i].ending.name), -counts[i]))
         ends, cells = [], np.full(count, NOT_REACHED)
@@ -323,14 +368,14 @@ class BasinSearch:
         )
 
     def _example(self, X: Array) -> Pose:
-        """Of the starts X (n, 4, 4) that end alike the one nearest to their middle, if small steps lead there from the
-        zero configuration; else the nearest to which they do, of the first few."""
+        """Return one of the starts X (n, 4, 4) with the same outcome: the nearest to their centre, if small steps lead
+        there from the zero configuration; else the nearest of the first few to which they do."""
         away = np.linalg.norm(X[:, :3, 3] - np.median(X[:, :3, 3], axis=0), axis=1)
         near = [self.setup.motion.pose(each) for each in X[np.argsort(away, kind="stable")[:FLOW_EXAMPLES]]]
         return next(filter(self._starts, near), near[0])
 
     def _starts(self, pose: Pose) -> bool:
-        """Whether a single run can start at a pose as it is printed."""
+        """Return True if a single run can start at a pose with its printed digits."""
         try:
             (at,) = configurations_at(self.setup, [Pose.parse(str(pose))])
             ServoTask.between(self.setup, at, self.goal)
@@ -339,7 +384,7 @@ class BasinSearch:
         return True
 
     def _abreast(self, X: Array, possible: Flags, seed: int) -> OutcomeCount:
-        """The outcomes of starts X (n, 4, 4) that the batch follows, all abreast."""
+        """Return the outcomes of starts X (n, 4, 4) in a batch."""
         flow, length = self.flow, self.goal.model.length
         assert flow is not None
         starts = np.flatnonzero(possible & flow.batch.reaches(X))
@@ -387,12 +432,13 @@ class BasinSearch:
         ]
         for run, outcome in zip(followed, told[min(len(away), 1) :], strict=True):
             numbers[run] = outcomes.number(outcome)
-        numbers[numbers < 0] = outcomes.number(Outcome(RunOutcome(UNDECIDED, "not followed to an end")))
+        numbers[numbers < 0] = outcomes.number(Outcome(RunOutcome(UNDECIDED, "not simulated to the end")))
         cells[starts] = numbers
         return OutcomeCount(outcomes.all, cells, damped, X, len(followed), len(same), sum(same), certified)
 
     def _one_by_one(self, X: Array, grid: Grid) -> OutcomeCount:
-        """The outcomes of the starts of a grid, each simulated; X (n, 4, 4) are its poses, free parts as at home."""
+        """Return the outcomes of the starts of a grid, each simulated; X (n, 4, 4) are its poses, free parts as at the
+        zero configuration."""
         all_samples = self.setup.all_samples
         at = sweep(all_samples.start, all_samples.observation_model, grid, self.setup.motion, self.setup.placer)
         starts = np.array([i for i, each in enumerate(at) if each is not None], dtype=int)
@@ -419,7 +465,7 @@ class BasinSearch:
         return [partial(_simulate, self.task, starts[k : k + FLOW_SINGLE]) for k in range(0, len(starts), FLOW_SINGLE)]
 
     def _run_all(self, works: Sequence[Callable[[], Any]]) -> list[Any]:
-        """What pieces of work give, in their order."""
+        """Return the results of pieces of work, in their order."""
         jobs, found = min(self.jobs, len(works)), []
         for each in run_shared(works, jobs):
             if jobs > 1:
@@ -429,13 +475,10 @@ class BasinSearch:
 
 
 def hindrances(setup: ObservedRobot) -> tuple[str, ...]:
-    """Why runs of a robot cannot be integrated abreast."""
+    """Return the reasons why runs of a robot cannot be batched."""
     own = set(map(id, setup.segments))
     kinds = dict.fromkeys("" if each.by_segment else each.kind for each in setup.observed if id(each) not in own)
-    found = [
-        f"observations of kind {kind} are fed back" if kind else "other links are watched than by default"
-        for kind in kinds
-    ]
+    found = [f"observations of kind {kind}" if kind else "observed links other than the default ones" for kind in kinds]
     if setup.mechanism.stops:
         found.append("a joint has limits")
     return tuple(found) or (("a leg has no closed form",) if setup.placer is None else ())
@@ -448,10 +491,10 @@ def place_of(motion: PlatformMotion, X: Array, names: Sequence[str]) -> Array:
 
 
 def _at(outcome: Outcome, X: Array, length: float) -> Outcome:
-    """The outcome of runs abreast that end at X (4, 4), of which one was simulated on from there."""
+    """Return the outcome of batched runs that end at X (4, 4), of which one was continued from there."""
     if outcome.X is not None and pose_difference(outcome.X, X, length) <= RUNS_ALIKE:
         return outcome
-    return Outcome(RunOutcome(UNDECIDED, "a single run does not stay where these end"))
+    return Outcome(RunOutcome(UNDECIDED, "a single run does not stay at the end of these"))
 
 
 def _follow_flow(flow: Flow, horizon: float, farthest: float, X: Array, few: int) -> BatchedRuns:
@@ -465,10 +508,10 @@ def _simulate(task: ServoTask, starts: Sequence[ClosedConfiguration | None]) -> 
     loop, found = task.loop(), []
     for start in starts:
         if start is None:
-            found.append(Outcome(RunOutcome(UNDECIDED, "the robot was not found closed there")))
+            found.append(Outcome(RunOutcome(UNDECIDED, "no closed configuration was found there")))
             continue
         if task.law.in_front(start) < SEEN_ABOVE:
-            found.append(Outcome(RunOutcome(SIGHT, "a camera does not see at the start what it is to see")))
+            found.append(Outcome(RunOutcome(SIGHT, "an observed feature is out of view at the start")))
             continue
         run = loop.simulate(start, task.conditions.horizon)
         ending = classifier.classify(run, measure_all(run.last, task.law.observation_model)[0])

@@ -1,8 +1,8 @@
-"""Many runs of the law abreast: Rosenbrock's method of order 2 (Shampine and Reichelt, *The MATLAB ODE suite*, 1997),
-each run with steps of its own, in charts about the pose where its step begins.
+"""Batched runs of the law: Rosenbrock's method of order 2 (Shampine and Reichelt, *The MATLAB ODE suite*, 1997), each
+run with its own steps, in charts about the pose at which a step begins.
 
-The damped law is stiff where a run goes along a singularity, so the method is implicit. A watched leg that is stretched
-goes on in its other working mode; one that is not watched holds the platform (:mod:`.flow`).
+The damped law is stiff where a run follows a singularity, so the method is implicit. A stretched observed leg continues
+in its other working mode; a stretched unobserved leg constrains the platform (:mod:`.flow`).
 """
 
 from __future__ import annotations
@@ -42,16 +42,16 @@ from .flow import CommandedMotion, Flags, Flow, Places
 GAMMA = 1 / (2 + np.sqrt(2))
 E32 = 6 + np.sqrt(2)
 LONGEST_STEP = 2.0
-"""Time constants: a longer step of an implicit method would stay at a rest that repels."""
+"""Time constants: a longer step of an implicit method would stay at an unstable equilibrium."""
 POLISHED = 4
 """Newton steps at the end of a run whose error vanishes."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Runs(Value):
-    """Where n runs ended: platform poses (n, 4, 4), ‖e‖ (n,), why they stopped (words of ``run``), which legs are in
-    another working mode than at first and which hold the platform, (n, legs), whether the law was damped on the way
-    (``weak``, (n,)), and the time (time constants)."""
+    """State of n runs at their end: platform poses (n, 4, 4), ‖e‖ (n,), why they stopped (words of ``run``), which legs
+    are in another working mode than at first and which constrain the platform, (n, legs), whether the law was damped
+    along the run (``weak``, (n,)), and the time (time constants)."""
 
     X: Array
     size: Array
@@ -62,8 +62,8 @@ class Runs(Value):
     times: Array
 
     def groups(self, length: float, seen: Flags) -> list[Places]:
-        """The runs that came to rest, by the poses and the working modes of the ``seen`` legs in which they did, the
-        largest group first."""
+        """Return the runs that converged, grouped by the poses and the working modes of the ``seen`` legs at the end,
+        the largest group first."""
         left, found = np.flatnonzero(np.isin(self.stopped, (SERVED_AT, REST))), []
         while len(left):
             gap = np.abs(self.X[left] - self.X[left[0]])
@@ -99,7 +99,7 @@ class BatchedRuns:
         return Runs(self.X, size, self.stopped, self.flipped, self.active, self.weak, self.times)
 
     def follow(self, horizon: float, few: int = 0) -> Self:
-        """The same, until no more than a ``few`` are on their way."""
+        """Continue the runs until at most a ``few`` have not ended."""
         live = np.flatnonzero(self.stopped == "")
         here = self._at(live)
         self.stopped[live[~here.reached]] = LOST
@@ -295,7 +295,7 @@ def _part(here: CommandedMotion, kept: Flags) -> CommandedMotion:
 
 
 def _merge(here: CommandedMotion, there: CommandedMotion, good: Flags) -> CommandedMotion:
-    """What is commanded there where ``good``, else here."""
+    """Return the command at ``there`` where ``good``, else that at ``here``."""
     found = []
     for name in CommandedMotion.__dataclass_fields__:
         one, other = getattr(here, name), getattr(there, name)

@@ -1,4 +1,4 @@
-"""Whether the rests that were found are all: what boxes of platform poses prove, beside the list (:mod:`.cover`)."""
+"""Completeness of a list of equilibria: proved by boxes of platform poses (:mod:`.cover`)."""
 
 from __future__ import annotations
 
@@ -43,8 +43,7 @@ CLOSING_STARTS = 3000
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CompletenessProof(Value):
-    """Boxes of platform poses: those at which the error vanishes, and (None where that was not asked) all critical
-    ones."""
+    """Boxes of platform poses: those at which the error vanishes, and all critical points (None if not requested)."""
 
     system: ErrorSystem
     setup: ObservedRobot
@@ -53,20 +52,20 @@ class CompletenessProof(Value):
 
     @property
     def observation_model(self) -> ObservationModel:
-        """What is observed."""
+        """Observation model of the loop."""
         return self.setup.samples.observation_model
 
     @classmethod
     def of(
         cls, setup: ObservedRobot, goal: ClosedConfiguration, system: ErrorSystem, boxes: int | None, jobs: int
     ) -> CompletenessProof:
-        """Those of a goal; all critical ones with as many ``boxes`` at most, if that is asked, in so many processes
-        (``jobs``)."""
-        with part("poses without an error"):
+        """Subdivide the poses of a goal; for all critical points into ``boxes`` at most, if given, by ``jobs``
+        processes."""
+        with part("poses with zero error"):
             found = cover(setup, goal, vanishing=True, budget=boxes or SIGN_BOXES, jobs=jobs)
         if boxes is None:
             return cls(system, setup, found, None)
-        with part("all rests"):
+        with part("all equilibria"):
             return cls(system, setup, found, cover(setup, goal, budget=boxes, jobs=jobs))
 
     def find_missed(
@@ -126,12 +125,12 @@ class CompletenessProof(Value):
         ]
 
     def proves(self, rest: Equilibrium) -> bool:
-        """Whether boxes prove that a rest is by itself, though E is nearly flat there."""
+        """Return True if boxes prove that an equilibrium is isolated, though E is nearly flat there."""
         told, u = self.every, directions(rest.configuration, self.observation_model)[0]
         return told is not None and told.place(rest.configuration, u) is not None
 
     def judge(self, rests: Sequence[Equilibrium]) -> CompletenessReport | None:
-        """Whether the rests are all."""
+        """Compare the equilibria with the critical points that boxes prove; None without boxes."""
         if self.every is None:
             return None
         told = self.every
@@ -159,7 +158,8 @@ class CompletenessProof(Value):
         )
 
     def _locks(self, labels: Sequence[str], at: ClosedConfiguration) -> bool:
-        """Whether the joints of a leg lock: they move its end in fewer ways than at the zero configuration."""
+        """Return True if the joints of a leg lock: they move its end in fewer directions than at the zero
+        configuration."""
         start, base = self.setup.all_samples.start, self.setup.mechanism.base
         return any(
             leg_twists(at, leg, (), base).shape[1] < leg_twists(start, leg, (), base).shape[1]
@@ -168,7 +168,7 @@ class CompletenessProof(Value):
         )
 
     def _alone(self, told: SubdivisionResult, box: CriticalBox) -> ProvedCriticalPoint:
-        """A critical point that is no rest of the list."""
+        """Return a critical point that is no equilibrium of the list."""
         error = told.error
         assert error is not None
         seen = error.coordinates

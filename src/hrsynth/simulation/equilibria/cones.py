@@ -25,7 +25,7 @@ from .pose_error import Number, PoseError
 LONG_SLICE = 1 / 16
 """Length of a slice above which it is made shorter before its cone is cut."""
 LONGER = 1.5
-"""By how much the next slice is longer where one is proved."""
+"""Factor by which the next slice is longer after a proved one."""
 
 
 @dataclass(eq=False)
@@ -43,7 +43,7 @@ class RisingCones:
 
     @classmethod
     def all(cls, n: int, core: float, rise: float) -> RisingCones:
-        """Those of the 2 n faces of the cube, outside a ``core`` |w| ≤ ρ that is proved with this ``rise``."""
+        """Return the cones of the 2 n faces of the cube, outside a ``core`` |w| ≤ ρ proved with this ``rise``."""
         eye = np.eye(n)
         middle = np.concatenate([eye, -eye])
         half = np.concatenate([1 - eye, 1 - eye])
@@ -89,10 +89,12 @@ def proved_all_over(
     judge: Callable[[Array, Array], tuple[NDArray[np.bool_], NDArray[np.int64]]],
     most: int,
 ) -> tuple[bool, int]:
-    """Whether something is proved at all points of a region in the box |x| ≤ ``whole`` (n,), and by how many boxes.
+    """Return True if something is proved at all points of a region in the box |x| ≤ ``whole`` (n,); with the number of
+    boxes.
 
-    ``inside`` tells which boxes (c, n) meet the region, ``judge`` in which it is proved and across which axis to cut
-    the others. With more than ``most`` boxes it is not proved."""
+    ``inside`` selects the boxes (c, n) that meet the region, ``judge`` those in which it is proved and the axis across
+    which the others are cut. With more than ``most`` boxes it is not proved.
+    """
     middle, half, boxes = np.zeros((1, len(whole))), whole[None], 0
     while True:
         kept = inside(middle, half)
@@ -106,7 +108,7 @@ def proved_all_over(
 
 @dataclass(frozen=True, eq=False)
 class ConeProver:
-    """What encloses the error over slices of cones, with ``W`` (n, n) and Q (rows, n), the rates of e by w at the goal:
+    """Enclosures of the error over slices of cones, with ``W`` (n, n) and Q (rows, n), the rates of e by w at the goal:
     reach margins, e (rows) and its rates along the ray."""
 
     error: PoseError
@@ -232,8 +234,8 @@ class ConeProver:
 
 @dataclass(frozen=True, eq=False)
 class SliceBounds:
-    """Of slices (c,): whether all legs reach, a lower bound of E's rate by t, over t, bounds of E, and how much the
-    rate changes across the axes of w (c, n)."""
+    """Bounds over slices (c,): all legs reach, a lower bound of E's rate by t, over t, bounds of E, and the change of
+    the rate across the axes of w (c, n)."""
 
     reached: NDArray[np.bool_]
     rise: Array

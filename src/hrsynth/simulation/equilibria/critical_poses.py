@@ -1,8 +1,8 @@
-"""Critical points of the error over the platform's pose, where legs have closed forms, and the joints that go there.
+"""Critical points of the error over the platform's pose, where legs have closed forms, and the joints that reach them.
 
-A pose and the working modes of the watched legs decide the error (:mod:`.pose_system`), so that starts are as cheap as
-they are few coordinates: from all that the legs reach, in all working modes, with the platform turned at random, and
-from poses beside those that were found, as rests lie near each other. Nothing here proves anything.
+A pose and the working modes of the observed legs determine the error (:mod:`.pose_system`), so that a start is cheap:
+few coordinates. Starts are everywhere within the legs' reach, in all working modes, with random rotations of the
+platform, and beside poses already found, as equilibria lie near each other. Nothing here is a proof.
 """
 
 from __future__ import annotations
@@ -45,11 +45,11 @@ from .pose_system import LegSystem, unbound
 LONGEST_STEP = 0.25
 """Longest change of a coordinate in a step."""
 Fit = Callable[[Array], NDArray[np.bool_]]
-"""Which of configurations (c, N) will do."""
+"""Test of configurations (c, N)."""
 BESIDE = (0.1, 0.3, 0.6, 1.0)
-"""How far (characteristic lengths, components of a quaternion) starts lie beside poses that were found, about."""
+"""Distance (characteristic lengths, components of a quaternion) of starts from poses already found, about."""
 FARTHER = 3.0
-"""Where legs do not end it, the box of starts is this many times as wide as that which is covered."""
+"""Factor of the box of starts over the searched one, if legs do not bound it."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -79,7 +79,7 @@ class CriticalPoses(Value):
 
     @property
     def marks(self) -> Array:
-        """What tells them apart, (k, n)."""
+        """Return the values that distinguish them, (k, n)."""
         return np.concatenate([self.p, *np.moveaxis(self.R, 1, 0), *np.moveaxis(self.directions, 1, 0)], axis=1)
 
 
@@ -122,8 +122,8 @@ def _apart(found: CriticalPoses, drawn: CriticalPoses) -> CriticalPoses:
 
 
 def _held_sets(error: PoseError) -> list[tuple[int, ...]]:
-    """The sets of limbs that are held, none first: at their limits those that are not watched, as E does not know how
-    far they are from it; of watched rods that slide one that is free, as it may be short."""
+    """Return the sets of legs that are fixed, the empty set first: unobserved ones at their limits, as E does not
+    depend on their distance from it; of observed sliding rods one that is free, as it may be short."""
     watched = {each.limb for each in error.seen}
     idle = [i for i, limb in enumerate(error.limbs) if i not in watched and isinstance(limb, OnRod)]
     held = [chosen for size in range(min(len(idle), error.size - 1) + 1) for chosen in combinations(idle, size)]
@@ -173,7 +173,7 @@ def _round(
 def _lead_starts(
     system: LegSystem, y: Array, rng: np.random.Generator
 ) -> tuple[CriticalPoses, dict[tuple[int, ...], CriticalPoses]]:
-    """What starts (c, N) lead to."""
+    """Return the results of starts (c, N)."""
     error = system.error
     with np.errstate(all="ignore"):
         index = rng.integers(system.size[0] - system.size[1] + 1, size=len(y))
@@ -238,17 +238,17 @@ class PoseToJoints:
         ]
 
     def vectors(self, carrier: SweptChains) -> list[CarriedVector]:
-        """Where the platform's point is, how it is turned, and the directions."""
+        """Return the platform's point, its rotation, and the directions, as vectors."""
         turns = [carrier.direction(self.body, axis) for axis in self.axes] if self.turning else []
         return [carrier.point(self.body, self.point), *turns, *(carrier.direction(*each) for each in self.seen)]
 
     def values_at(self, q: Array) -> Array:
-        """The same at coordinates (c, N), (c, k)."""
+        """Return their values at coordinates (c, N), (c, k)."""
         vectors = self.vectors(SweptChains(self.system.system, list(q.T)))
         return np.concatenate([np.broadcast_to(each.value, (len(q), 3)) for each in vectors], axis=1)
 
     def desired_values(self, poses: CriticalPoses) -> Array:
-        """What they are to be, (c, k)."""
+        """Return their desired values, (c, k)."""
         turns = [poses.R[:, :, i] for i in range(3)] if self.turning else []
         return np.concatenate(
             [poses.p / self.system.system.length, *turns, *np.moveaxis(poses.directions, 1, 0)], axis=1
@@ -290,7 +290,8 @@ class PoseToJoints:
         return found, done
 
     def _groups(self) -> list[tuple[list[int], list[int]]]:
-        """Coordinates that loops tie together behind the platform's pose, and what of all that is told they decide."""
+        """Return groups of coordinates that loops couple behind the platform's pose, each with the values that it
+        determines."""
         loops = self.system.system
         trunk, own = set(self.body), list[set[int]]()
         for loop in loops.loops:

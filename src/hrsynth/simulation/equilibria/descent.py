@@ -22,11 +22,11 @@ from ...tolerances import COMMAND_CUTOFF, COMMAND_STEP, CRITICAL, CRITICAL_FLAT,
 from .error import CriticalPointEquations, ErrorSystem
 
 LONGEST_STEP = 0.25
-"""Longest change of a coordinate in a step (characteristic lengths, radians)."""
+"""Largest change of a coordinate in a step (characteristic lengths, radians)."""
 SHARPENING_STEPS = 4
 """Newton's steps from a critical point that was found."""
 WALK_STEP = 0.3
-"""The same of a random step between starts."""
+"""Largest change of a coordinate in a random step between starts."""
 
 
 class Equations(Protocol):
@@ -45,14 +45,14 @@ class CriticalPointProblem(Protocol):
     """Whose critical points are sought."""
 
     def at(self, values: Sequence[Any]) -> Equations:
-        """Its equations at values (N,) of (c,) each."""
+        """Return the equations at values (N,) of (c,) each."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CriticalPoint(Value):
-    """A critical point of E: coordinates (N,) and multipliers (m,), ∇E on the loops and G as they are left
+    """Critical point of E: coordinates (N,) and multipliers (m,), the residuals of ∇E on the loops and of G
     (``residual``), and the eigenvalues of the Hessian along the motions of the loops, ascending, without those of
-    motions that are idle there; ``value`` is E."""
+    internal motions; ``value`` is E."""
 
     q: Array
     multipliers: Array
@@ -62,7 +62,7 @@ class CriticalPoint(Value):
 
     @property
     def vanishes(self) -> bool:
-        """Whether e = 0, as far as E = ½ ‖e‖², a difference of numbers of size one, tells it."""
+        """Return True if e = 0, as far as E = ½ ‖e‖², a difference of numbers of size one, resolves it."""
         return self.value < ERROR_ROUNDING
 
 
@@ -77,7 +77,7 @@ class Tangents:
 
     @classmethod
     def of(cls, DG: Array) -> Tangents:
-        """Those of DG (c, m, N)."""
+        """Compute the tangents of DG (c, m, N)."""
         m = DG.shape[-2]
         Q, R = np.linalg.qr(np.swapaxes(DG, -1, -2), mode="complete")
         R = R[..., :m, :]
@@ -97,9 +97,9 @@ class Tangents:
 
 @dataclass(frozen=True, eq=False)
 class Expansion:
-    """E on the loops to second order at configurations (c,): the closing step p (c, N), multipliers μ (c, m), gradient
-    (c, d) and Hessian along Z: its eigenvalues (c, d) and directions (c, N, d), the last ``idle`` of them those of the
-    motions that are most nearly idle."""
+    """Expansion of E on the loops to second order at configurations (c,): the closing step p (c, N), multipliers μ (c,
+    m), gradient (c, d) and Hessian along Z: its eigenvalues (c, d) and directions (c, N, d), the last ``idle`` of them
+    those of the motions that are most nearly internal."""
 
     E: Array
     closing: Array
@@ -112,18 +112,18 @@ class Expansion:
 
     @property
     def freedoms(self) -> int:
-        """d without idle motions."""
+        """d without internal motions."""
         return self.curvatures.shape[-1] - self.idle
 
     def curvatures_of(self, k: int) -> Array:
-        """The curvatures of the k-th configuration, ascending: of idle motions none but those that are not idle there,
-        as where an arm with a joint more than freedoms is stretched."""
+        """Return the curvatures of the k-th configuration, ascending, without those of internal motions that are
+        internal there too: an arm with a redundant joint has others where it is stretched."""
         values, d = self.curvatures[k], self.freedoms
         return np.sort(np.concatenate([values[:d], values[d:][np.abs(values[d:]) > CRITICAL_FLAT]]))
 
     @classmethod
     def of(cls, system: CriticalPointProblem, q: Array, idle: int) -> Expansion:
-        """That at q (c, N)."""
+        """Expand E at q (c, N)."""
         with np.errstate(all="ignore"):
             at = system.at(list(q.T))
             tangents = Tangents.of(at.DG)
@@ -175,7 +175,7 @@ def close_loops(system: ErrorSystem, q: Array, steps: int = 12) -> Array:
 
 
 def are_closed(system: ErrorSystem, q: Array, within: float = CRITICAL) -> NDArray[np.bool_]:
-    """At which configurations (c, N) all equations of the loops hold, to a residual."""
+    """Return True for configurations (c, N) at which all equations of the loops hold, to a residual."""
     return np.asarray(np.linalg.norm(system.closures(q)[0], axis=-1) < within)
 
 

@@ -61,7 +61,7 @@ def reduced_gradient(M: AffineForms, slope: AffineForms, P: Places, N: Places) -
 
 @lru_cache(maxsize=64)
 def _eliminate(k: int, n: int) -> BoxFormula:
-    """What Gauss's elimination leaves of k rows of n numbers and one more, and the minors before its last step."""
+    """Return k rows of n numbers and one more after Gauss's elimination, and the minors before its last step."""
 
     def formula(y: Sequence[Any], number: Any) -> list[Any]:
         rows, rest = [list(y[n * i : n * i + n]) for i in range(k)], list(y[n * k :])
@@ -80,8 +80,8 @@ def _eliminate(k: int, n: int) -> BoxFormula:
 
 
 def away(F: AffineForms, own: int) -> Flags:
-    """Whether F (c, d) is enclosed away from zero: a component of it, F along its own middle, or a component in the
-    coordinates in which it is nearest to the first symbols, the box's ``own``."""
+    """Return True where F (c, d) is enclosed away from zero: a component of it, F along its own centre, or a component
+    in the coordinates in which it is nearest to the first symbols, the box's ``own``."""
     with np.errstate(all="ignore"):
         found = np.any(np.abs(F.v[0]) > F.spread * (1 + AFFINE_ROUNDING), axis=1)
         found |= combine(np.nan_to_num(F.v[0])[:, None, :], F).low[:, 0] > 0

@@ -1,15 +1,15 @@
-"""Critical points of the error enclosed: that there is exactly one in a box, and of which index.
+"""Enclosures of critical points of the error: a box with exactly one, and its index.
 
-Unknowns are the coordinates and the multipliers (q, μ), equations ∇E + DGᵀ μ = 0 and G = 0; where motions are idle, as
-many coordinates are held. With K the derivatives, [[H, DGᵀ], [DG, 0]], enclosed over the box |x − x₀| ≤ r, and Y about
+Unknowns are the coordinates and the multipliers (q, μ), equations ∇E + DGᵀ μ = 0 and G = 0; for internal motions, as
+many coordinates are fixed. With K the derivatives, [[H, DGᵀ], [DG, 0]], enclosed over the box |x − x₀| ≤ r, and Y about
 K⁻¹, Krawczyk's operator −Y F(x₀) + (1 − Y K) [−r, r] inside [−r, r] proves one zero there (A. Neumaier, Interval
 Methods for Systems of Equations, 1990, section 5.1). VᵀKV, V about the eigenvectors of K, then has the inertia of K
-(Sylvester), which is that of H along the motions of the loops beside m positive and m negative ones; its diagonal tells
-it where it outweighs the rest of each row (Gershgorin).
+(Sylvester), which is that of H along the motions of the loops beside m positive and m negative ones; its diagonal
+decides it where it outweighs the other entries of each row (Gershgorin).
 
 The loop, linearised without damping, is ṡ = −λ (JᵀJ)⁻¹ H s along the motions of the loops, J the rates of e. The
 eigenvalues μ of (JᵀJ)⁻¹ H below σ are as many as negative ones of H − σ JᵀJ along these motions where JᵀJ is positive
-definite there, which the inertia of K − σ [[JᵀJ, 0], [0, 0]] tells as well: so each μ is enclosed between two σ.
+definite there, and the inertia of K − σ [[JᵀJ, 0], [0, 0]] gives that number: so each μ is enclosed between two σ.
 
 The equations of the loops that are not among G hold where they follow from these (:func:`unexplained_rows`).
 """
@@ -38,11 +38,10 @@ RATE_WIDTHS = (1e-9, 1e-7, 1e-5, 1e-3, 1e-1)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class EnclosedPoint(Value):
-    """A box |q − q₀| ≤ r (N,) that holds exactly one critical point with its idle coordinates held; ``index`` is the
-    number of negative eigenvalues of the Hessian along the motions of the loops, the others positive, None where that
-    was not proved. Loops ``measured`` have equations that were left out and do not follow from the others. ``rates``
-    enclose the eigenvalues of (JᵀJ)⁻¹ H, ascending: −1/λ times those of the linearised loop, without damping; empty
-    where that was not proved."""
+    """Box |q − q₀| ≤ r (N,) with exactly one critical point, its internal coordinates fixed. ``index`` is the number of
+    negative eigenvalues of the Hessian along the motions of the loops, the others positive; None if not proved. Loops
+    ``measured`` have equations that were left out and do not follow from the others. ``rates`` enclose the eigenvalues
+    of (JᵀJ)⁻¹ H, ascending: −1/λ times those of the linearised loop, without damping; empty if not proved."""
 
     q: Array
     radius: Array
@@ -71,7 +70,7 @@ def enclose_points(system: ErrorSystem, points: Sequence[CriticalPoint], idle: i
 
 
 def _enclose(system: ErrorSystem, q: Array, idle: int) -> list[EnclosedPoint | None]:
-    """The same with given equations, for configurations (c, N)."""
+    """Enclose critical points about configurations (c, N) with the equations of the system."""
     size, count = system.size
     at = CriticalPointEquations(system, list(q.T))
     mu = Tangents.of(at.DG).multipliers(at.slope)
@@ -174,7 +173,7 @@ def _rates(K: AffineForms, gram: AffineForms, free: Array, count: int) -> list[t
 
 
 def _eigenvalues(H: Array, gram: Array, DG: Array, free: NDArray[np.intp], count: int) -> Array:
-    """Those of gram⁻¹ H on the kernel of DG, about; no numbers where gram is singular there."""
+    """Return approximate eigenvalues of gram⁻¹ H on the kernel of DG; NaN where gram is singular there."""
     from scipy.linalg import LinAlgError, eigh
 
     if not (np.isfinite(H).all() and np.isfinite(gram).all() and np.isfinite(DG).all()):
@@ -189,7 +188,7 @@ def _eigenvalues(H: Array, gram: Array, DG: Array, free: NDArray[np.intp], count
 
 
 def _lost_rank(K: Array) -> Array:
-    """What is added to singular matrices (c, n, n) so that they can be inverted: nothing is proved of them."""
+    """Return the matrices that make singular matrices (c, n, n) invertible: nothing is proved of these."""
     known = np.where(np.isfinite(K), K, 0.0)
     values = np.linalg.svd(known, compute_uv=False)
     lost = ~np.isfinite(K).all(axis=(-1, -2)) | (values[..., -1] <= 1e-14 * values[..., 0])
@@ -214,8 +213,8 @@ def negative(K: AffineForms) -> Array:
 
 
 def _free(system: ErrorSystem, q: Array, idle: int) -> Array:
-    """1 for coordinates (c, N) that are solved for, 0 for as many as motions are idle, those that tell these apart
-    best."""
+    """Return 1 for coordinates (c, N) that are solved for, 0 for as many as there are internal motions: those that
+    distinguish these best."""
     free = np.ones(q.shape)
     if idle and len(q):
         from scipy.linalg import qr
@@ -227,7 +226,7 @@ def _free(system: ErrorSystem, q: Array, idle: int) -> Array:
 
 
 def idle_motions(system: ErrorSystem, q: Array, idle: int) -> Array:
-    """Motions of the loops (c, N, idle) at configurations (c, N) along which E is flattest: those that are idle."""
+    """Return motions of the loops (c, N, k) at configurations (c, N) with the flattest E: the internal ones."""
     at = CriticalPointEquations(system, list(q.T))
     tangents = Tangents.of(at.DG)
     Z = tangents.Z

@@ -1,5 +1,5 @@
-"""All poses at which a loop can rest: the goal, its modes, antipodal poses, and critical poses of the error; which of
-them attract (docs/pages/theory.md, section 11)."""
+"""Equilibria of the servo loop: the goal, its assembly modes, antipodal poses, and nonzero-error equilibria; which of
+them are stable (docs/pages/proofs.md, section 11)."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ from .search import CountedCriticalPoint, critical_points, in_mode
 MISSED_ROUNDS = 3
 """Rounds in which it is tried to close the robot at the proved poses that are not in the list."""
 MODE_TRIES = 4
-"""Walks from a rest that are tried to see its operation mode."""
+"""Walks from an equilibrium that are tried to determine its operation mode."""
 NEARBY = 0.02
 """Step (characteristic lengths, radians) of the first of these walks."""
 
@@ -72,7 +72,7 @@ def equilibria(
     goal: Annotated[
         PoseLike | None,
         option(
-            "The goal: pose whose measurements are desired, such as x=0.02,y=0.1,z=-0.7; or mode:2 "
+            "Pose whose measured values are desired, such as x=0.02,y=0.1,z=-0.7; or mode:2 "
             "(default: the zero configuration).",
             "POSE",
         ),
@@ -80,30 +80,55 @@ def equilibria(
     depth: Depth = "exact",
     complete: Annotated[bool, option("Try to prove that the list is complete, by boxes of platform poses.")] = False,
     max_boxes: Annotated[
-        int, option("Most boxes of poses to look at (10,000 to 40,000 take a second).", "COUNT", low=1)
+        int, option("Largest number of pose boxes (10,000 to 40,000 take a second).", "COUNT", low=1)
     ] = COVER_BOXES,
     jobs: Jobs = None,
     seed: Seed = 0,
 ) -> Equilibria:
-    """Poses at which the servo loop can rest, and which of them attract: the goal, modes, antipodal poses,
-    critical poses of the error.
+    """Equilibria of the servo loop and their stability: the goal, its assembly modes, antipodal poses, and
+    nonzero-error equilibria.
 
-    Poses at which the loop can rest that servoes what is observed at ``goal`` (default: the zero configuration): the
-    goal, modes and antipodal poses, where the error vanishes, and critical poses, where it does not; and which of them
-    attract.
+    Parameters
+    ----------
+    robot
+        Robot, file or name.
+    observe, camera, sensor
+        Observations, as for ``derive``; each kind of observation has its own error.
+    goal
+        Pose whose measured values are desired (m, rad, in the base frame; default: the zero configuration).
+    depth
+        Depth of image features that the law assumes, as for ``servo``. If it assumes one, its command is not a
+        gradient, and equilibria are found, not proved.
+    complete
+        Try to prove that the list is complete, by subdivision of a box of platform poses (seconds to minutes).
+    max_boxes
+        Largest number of boxes of that subdivision.
+    jobs
+        Number of processes, by default one per core; the result does not depend on it.
+    seed
+        Seed of samples and starts.
 
-    ``observe``, ``camera`` and ``sensor`` are as for ``derive``; each kind of observation has its error. The law rests
-    exactly at the critical points of ½ ‖e‖² on the closed loops (proofs.md 11); those at which a camera does not see
-    what it has to see are left out. They are sought from random walks on the branch of the zero configuration.
-    ``complete``: try to prove that they are all, by subdivision of a box of platform poses (seconds to minutes) into
-    ``max_boxes`` boxes at most; where these are many, so many processes share them (``jobs``, by default one per core),
-    on whose number no answer depends. ``depth`` is that of ``servo``; if the law assumes depths, its command is not a
-    gradient, and rests are only found.
+    Returns
+    -------
+    Equilibria
+        Equilibria with their stability, and the proof of completeness, if requested.
 
-    Raises ``BadRequest`` for unknown names, observations that do not see the platform, a singular goal, or one at which
-    something is behind its camera; ``PoseNotReached`` for a pose out of reach.
+    Raises
+    ------
+    BadRequest
+        Unknown name, a platform dof that is not observed, a singular goal, or a feature behind its camera.
+    PoseNotReached
+        The goal is out of reach.
 
-    >>> hrsynth.equilibria("rrrrr_m1", goal="x=0,y=0.25").attracting[0].kind
+    Notes
+    -----
+    The equilibria of the law are exactly the critical points of ½ ‖e‖² on the closed loops (docs/pages/proofs.md,
+    section 11). Those at which a feature is out of view are left out. They are sought from random walks on the branch
+    of the zero configuration.
+
+    Examples
+    --------
+    >>> hrsynth.equilibria("rrrrr_m1", goal="x=0,y=0.25").stable[0].kind
     'goal'
     """
     setup = ObservedRobot.of(robot, observe, camera, sensor=sensor, seed=seed)
@@ -116,13 +141,13 @@ def equilibria(
     require_regular(ConfigurationAnalysis.of(setup), "goal", target)
     search = EquilibriumSearch.of(setup, target, depth)
     require_sight(setup, search.law, "goal", target)
-    report("rests")
+    report("equilibria")
     return search.answer(seed, complete=complete, max_boxes=max_boxes, jobs=jobs or os.cpu_count() or 1)
 
 
 @dataclass(frozen=True, eq=False)
 class EquilibriumSearch:
-    """What the rests of a loop are sought with."""
+    """Data of a search for the equilibria of a loop."""
 
     setup: ObservedRobot
     goal: ClosedConfiguration
@@ -133,7 +158,7 @@ class EquilibriumSearch:
 
     @classmethod
     def of(cls, setup: ObservedRobot, goal: ClosedConfiguration, depth: str = "exact") -> EquilibriumSearch:
-        """That of a goal."""
+        """Prepare the search for a goal."""
         observation_model = setup.samples.observation_model
         planes = supposed_planes(depth, goal, observation_model)
         system = ErrorSystem.of(goal, observation_model, setup.configurations, planes)
@@ -158,9 +183,9 @@ class EquilibriumSearch:
         max_boxes: int = COVER_BOXES,
         jobs: int = 1,
     ) -> Equilibria:
-        """The rests that were found; ``minima`` and ``rounds`` as for :func:`.critical_points`, of minima alone neither
-        lists nor enclosures; ``complete``: whether it is to be proved that they are all, with ``max_boxes`` boxes at
-        most in so many processes (``jobs``)."""
+        """Return the equilibria found; ``minima`` and ``rounds`` as for :func:`.critical_points`, for minima alone
+        neither lists nor enclosures; ``complete``: try to prove that they are all, with at most ``max_boxes`` boxes and
+        ``jobs`` processes."""
         setup, motion = self.setup, self.setup.motion
         further = None if minima or self.system.supposes else self._further(seed)
         found = critical_points(
@@ -181,7 +206,7 @@ class EquilibriumSearch:
         report("enclosures")
         boxes: list[EnclosedPoint | None] = [None] * len(isolated)
         if not minima and not self.system.supposes:
-            # with idle coordinates held, curvatures of motions that are idle elsewhere are not enclosed
+            # with internal coordinates fixed, curvatures of motions that are internal elsewhere are not enclosed
             whole = [k for k, each in enumerate(isolated) if len(each.point.curvatures) <= self._freedoms]
             proved = enclose_points(self.system, [isolated[k].point for k in whole], found.idle)
             for k, box in zip(whole, proved, strict=True):
@@ -215,11 +240,11 @@ class EquilibriumSearch:
 
     @property
     def _freedoms(self) -> int:
-        """How many motions are not idle."""
+        """Return the number of motions that are not internal."""
         return self.setup.samples.members[0].relation.dimension
 
     def _further(self, seed: int) -> WidenedSearch | None:
-        """What finds critical points over the pose; None where legs have no closed forms."""
+        """Return the search for critical points over the pose; None if legs have no closed forms."""
         told = critical_poses(self.setup, self.goal, seed)
         if told is None:
             return None
@@ -275,7 +300,7 @@ class EquilibriumSearch:
 
     @cached_property
     def _known(self) -> dict[bytes, ClosedConfiguration | None]:
-        """What was asked of :meth:`_place`."""
+        """Results of :meth:`_place`."""
         return {}
 
     def _reversed_legs(self, at: ClosedConfiguration) -> tuple[str, ...]:
@@ -290,7 +315,7 @@ class EquilibriumSearch:
         return [(o.leg, float(u @ w)) for o, u, w in every if isinstance(o, SeenAxis)]
 
     def alike(self, at: ClosedConfiguration, other: ClosedConfiguration) -> bool:
-        """Whether the platform is at the same pose."""
+        """Return True if the platform is at the same pose."""
         return all(
             pose_difference(at.pose(body), other.pose(body), self.goal.model.length) <= SAME_ENDING
             for body in placing_links(self.setup.decomposition)
@@ -343,7 +368,7 @@ class EquilibriumSearch:
         )
 
     def _radius(self, box: EnclosedPoint, X: Array) -> tuple[float, float]:
-        """How far the platform can be from its pose X (4, 4) over a box (m, rad)."""
+        """Return the largest distance of the platform from its pose X (4, 4) over a box (m, rad)."""
         loops, motion = self.system.system, self.setup.motion
         forms = [affine(np.array([x]), np.zeros((1, 0)), np.array([r])) for x, r in zip(box.q, box.radius, strict=True)]
         carrier, chain = SweptChains(loops, forms), loops.way(loops.body[motion.link])
@@ -367,7 +392,7 @@ class EquilibriumSearch:
             return None
 
     def _side(self, at: ClosedConfiguration) -> str | None:
-        """On which side of the Type 2 locus a configuration is, seen from the goal; None where that is not known."""
+        """Return the side of the Type 2 locus on which a configuration lies, relative to the goal; None if unknown."""
         if self._condition is None:
             return None
         found, condition = self._condition
@@ -378,7 +403,7 @@ class EquilibriumSearch:
 
     @cached_property
     def _forms(self) -> LegPattern | None:
-        """The closed forms of the legs, which tell their working modes; None where there are none."""
+        """Closed forms of the legs, which give their working modes; None if there are none."""
         setup = self.setup
         members = (setup.all_samples.start, *setup.configurations)
         for each in path_coordinates(setup.decomposition, setup.samples.observation_model, setup.dof, members):
@@ -404,14 +429,14 @@ class EquilibriumSearch:
         )
 
     def _in_mode(self, found: Sequence[CountedCriticalPoint]) -> list[CountedCriticalPoint]:
-        """Those near which configurations are of the operation mode of the zero configuration."""
+        """Keep those near which configurations are of the operation mode of the zero configuration."""
         if not found:
             return []
         good = self._near_mode(np.array([each.point.q for each in found]))
         return [each for each, kept in zip(found, good, strict=True) if kept]
 
     def _near_mode(self, q: Array) -> NDArray[np.bool_]:
-        """Near which of coordinates (c, N) configurations are of that mode."""
+        """Return True for coordinates (c, N) near which configurations are of that mode."""
         good, rng = np.zeros(len(q), dtype=bool), np.random.default_rng(0)
         # what lies nearby may be nearly singular as well: then a little farther away
         for number in range(MODE_TRIES):
@@ -422,9 +447,9 @@ class EquilibriumSearch:
 
 
 def _ways(rests: Sequence[Equilibrium], search: EquilibriumSearch) -> list[Equilibrium]:
-    """Rests at one pose with the same measured directions as one: of the enclosed ones, if there are any, that in the
-    working modes nearest to the goal's (where loops are singular, coordinates are known to half their digits), with how
-    many there are."""
+    """Merge equilibria at one pose with the same measured directions, with their number. Of enclosed ones, if any, the
+    one in the working modes nearest to the goal's is kept (where loops are singular, coordinates are known to half
+    their digits)."""
     setup = search.setup
     segments, (home,) = (
         [np.concatenate([*measure_all(at, setup.all_samples.observation_model)[0]]) for at in every]
@@ -449,8 +474,8 @@ def _ways(rests: Sequence[Equilibrium], search: EquilibriumSearch) -> list[Equil
 
 
 def _sort(rests: Sequence[Equilibrium], link: str, length: float) -> list[Equilibrium]:
-    """Rests by kind, stable ones first, by their error and by where the platform is, then by legs in other working
-    modes: by what they are, not by the order in which they were found."""
+    """Sort equilibria by kind, stable ones first, by their error and the platform's position, then by legs in other
+    working modes: not by the order in which they were found."""
     kinds = (GOAL, MODE, ANTIPODAL, CRITICAL)
     named = sorted(rests, key=lambda each: (each.reversed, each.legs_in_other_mode or ()))
     poses = [each.configuration.pose(link) for each in named]
@@ -462,7 +487,7 @@ def _sort(rests: Sequence[Equilibrium], link: str, length: float) -> list[Equili
 
 
 def _telling_values(at: ClosedConfiguration, search: EquilibriumSearch) -> Array:
-    """Where the platform's bodies are (characteristic lengths), how they are turned, and all that is measured."""
+    """Return positions of the platform's links (characteristic lengths), their rotations, and all measured values."""
     poses = [at.pose(body) for body in placing_links(search.setup.decomposition)]
     return np.concatenate(
         [

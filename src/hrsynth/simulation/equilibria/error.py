@@ -1,8 +1,8 @@
 """The error that a loop decreases, E = ½ ‖e‖², and the closed loops on which it does, in joint coordinates: values,
 gradients and Hessians, for many floats or affine forms at once.
 
-The law commands q̇ = −λ B (L U B)⁺ e with B a basis of the motions of the closed loops: it rests exactly where
-Bᵀ ∇E = 0, at the critical points of E on the configurations G(q) = 0. With multipliers these are the zeros of
+The law commands q̇ = −λ B (L U B)⁺ e with B a basis of the motions of the closed loops: its equilibria are exactly
+where Bᵀ ∇E = 0, at the critical points of E on the configurations G(q) = 0. With multipliers these are the zeros of
 ∇E + DGᵀ μ beside G (docs/pages/proofs.md, section 11). Of a direction e = u × u_d, so that its part of E is
 ½ (1 − (u · u_d)²).
 """
@@ -42,7 +42,7 @@ class ErrorTerm(Protocol):
 
 @dataclass(eq=False)
 class ErrorSums:
-    """E (c,), ∇E (c, N) and, where they are asked for, ∇²E (c, N, N), and JᵀJ (c, N, N), J the rates of e."""
+    """E (c,), ∇E (c, N) and, if requested, ∇²E (c, N, N), and JᵀJ (c, N, N), J the rates of e."""
 
     value: Any
     slope: Total
@@ -248,9 +248,8 @@ class ErrorSystem(Value):
         generic: Sequence[ClosedConfiguration],
         planes: Sequence[Array | None] | None = None,
     ) -> ErrorSystem:
-        """That of the values measured at a goal; which equations are independent is seen at ``generic`` configurations;
-        ``planes`` (3,), in metres, are those in which the law supposes what is seen to lie, None where it knows them.
-        """
+        """Build the error of the values measured at a goal. ``generic`` configurations select independent equations;
+        ``planes`` (3,), in metres, are those of the assumed depths, None where the law knows these."""
         mechanism = goal.model.mechanism
         system = loop_system(mechanism, ())
         values = measure(goal.model, goal.q, observation_model.reference, observation_model.observations)[2]
@@ -263,7 +262,7 @@ class ErrorSystem(Value):
         return cls(system, (), (), terms).select_rows_at(np.array([system.read(each.pose) for each in generic]))
 
     def select_rows_at(self, q: Array) -> ErrorSystem:
-        """The same with equations that are independent at configurations (c, N)."""
+        """Return the error with equations that are independent at configurations (c, N)."""
         system = self.system
         every = [(loop, row) for loop in system.loops for row in loop.rows]
         chosen, count = independent(self.closures(q)[1], self.size[1] or None), len(every)
@@ -282,7 +281,7 @@ class ErrorSystem(Value):
 
     @property
     def supposes(self) -> bool:
-        """Whether the law supposes depths, so that what it commands is no gradient of E."""
+        """Return True if the law assumes depths, so that its command is no gradient of E."""
         return any(isinstance(each, ObservationTerm) and each.plane is not None for each in self.terms)
 
     @property

@@ -42,44 +42,44 @@ from .upu_legs import Struts
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SubdivisionResult(Value):
-    """What subdivision says of platform poses: all critical points of E there, in all working modes of the legs, but
-    for ``open`` boxes (lower, upper corner, in coordinates about the goal), which are a ``share``. ``bounded``: whether
-    the legs cannot reach beyond the box, or poses however far away were looked at too."""
+    """Result of the subdivision of platform poses: all critical points of E there, in all working modes of the legs,
+    except in ``open`` boxes (lower, upper corner, in coordinates about the goal), which are a fraction ``share``.
+    ``bounded``: the legs cannot reach beyond the box, or arbitrarily distant poses were searched too."""
 
     found: tuple[CriticalBox, ...]
     open: tuple[tuple[Array, Array], ...]
-    share: Annotated[float, "of the open boxes"]
+    share: Annotated[float, "fraction of the space in undecided boxes"]
     boxes: Recorded[int]
     bounded: bool
     reason: str = ""
     box: tuple[Array, Array] | None = None
-    """Where it was looked: the lower and the upper corner, in coordinates about the goal; None: everywhere."""
+    """Searched box: lower and upper corner, in coordinates about the goal; None: all poses."""
     error: PoseError | None = None
     short: tuple[ClosedFormLeg, ...] = ()
-    """Rods that slide and turn as they like: where one is shorter than ``SHORTEST_ROD`` it was not looked."""
+    """Freely rotating sliding rods; poses at which one is shorter than ``SHORTEST_ROD`` were not searched."""
     struts: Struts | None = None
-    """The legs of a platform that translates, whose joints' own singularities and all whose turns were looked at."""
+    """Legs of a platform that translates, whose joints' own singularities and all whose rotations were searched."""
     locked: tuple[tuple[Array, Array], ...] = ()
-    """Places (middle and half edges, in coordinates about the goal) at which equations of the legs may be dependent, so
-    that legs lock each other: there it was not looked."""
+    """Places (centre and half edges, in coordinates about the goal) at which equations of the legs may be dependent, so
+    that legs lock each other; they were not searched."""
     unread: Annotated[tuple[str, ...], "legs at whose locked joints nothing was searched"] = ()
-    """Legs in space with joints of which it is not known where they lock: there it was not looked."""
+    """Spatial legs with joints whose locked poses are unknown; these were not searched."""
 
     loop: LoopError | SpringError | None = None
-    """The watched legs, where rests were sought by the forces of two or three: it was not looked where a leg that is
-    not watched is stretched, nor where as many watched directions as are ``flat`` are at right angles to the desired
+    """Observed legs, if equilibria were sought by the forces of two or three. Not searched: poses at which an
+    unobserved leg is stretched, or at which at least ``flat`` observed directions are at right angles to the desired
     ones."""
     spent: bool = False
-    """Whether boxes are left open because no more were allowed."""
+    """Flag: boxes are undecided because the limit was reached."""
 
     @property
     def complete(self) -> bool:
-        """Whether these are all critical points there."""
+        """Return True if these are all critical points there."""
         return not self.open and not self.reason
 
     def holds(self, at: ClosedConfiguration) -> bool:
-        """Whether a configuration's pose was looked at: not where a platform that only translates is turned as at none
-        of the ``turns``, as it can be in another assembly."""
+        """Return True if a configuration's pose was searched: not if a platform that only translates has a rotation
+        that is none of the ``turns``, as it can in another assembly."""
         if self.error is None or self.error.coordinates is None or self.is_turned(at):
             return False
         (p, R), k = (each[0] for each in self.error.coordinates.of([at])), self.error.shifts.shape[1]
@@ -108,7 +108,7 @@ class SubdivisionResult(Value):
         return (np.eye(3),) if self.struts is None else self.struts.turns
 
     def is_turned(self, at: ClosedConfiguration) -> bool:
-        """Whether a platform that only translates is turned otherwise than it was looked at."""
+        """Return True if a platform that only translates has another rotation than was searched."""
         error = self.error
         if error is None or error.coordinates is None or error.motion.rotations.shape[1]:
             return False
@@ -116,8 +116,8 @@ class SubdivisionResult(Value):
         return all(np.abs(R - turn @ error.R).max() > SAME_ENDING for turn in self.turns)
 
     def place(self, at: ClosedConfiguration, u: Array) -> int | None:
-        """Which of the critical points a configuration with observed directions u (legs, 3) is at: far away as near as
-        directions tell."""
+        """Return the index of the critical point of a configuration with observed directions u (legs, 3); distant poses
+        are compared by directions."""
         if self.error is None or self.error.coordinates is None or not self.found or self.is_turned(at):
             return None
         p, R = (each[0] for each in self.error.coordinates.of([at]))
@@ -228,7 +228,7 @@ def _families(
     _read(error)
     if error.turns.shape[1] > 1:
         if vanishing:
-            raise NotEnclosed("the platform turns about more than one axis")
+            raise NotEnclosed("the platform rotates about more than one axis")
         return error, [SpringError.about(error)], None
     struts = Struts.of(setup, goal, error)
     if struts is not None:
@@ -273,7 +273,7 @@ def _corners(error: JointError, boxes: Sequence[tuple[Array, Array]], size: int)
 
 
 def _cut_long(every: Sequence[Subdivision], whole: Array, budget: int, jobs: int) -> None:
-    """Cut lost boxes on that together fill more than what can be told as one place, more finely step by step."""
+    """Subdivide undecided boxes that together are larger than one place, more finely step by step."""
     for finer in SINGULAR_FINER:
         own = [list(_corners(each.error, each.lost, len(whole))) for each in every]
         long = [
@@ -291,9 +291,9 @@ def _cut_long(every: Sequence[Subdivision], whole: Array, budget: int, jobs: int
 def _places(
     places: Sequence[tuple[Array, Array]], left: Sequence[tuple[Array, Array]], whole: Array
 ) -> tuple[list[tuple[Array, Array]], list[tuple[Array, Array]]]:
-    """Places (corners) where equations may be dependent, as middles and half edges, each with the smallest of the boxes
-    that are left open about it; and what is open besides: also what is long, or endless, and no place that can be told
-    by a point."""
+    """Return places (corners) where equations may be dependent, as centres and half edges, each with the smallest of
+    the undecided boxes about it; and the other undecided boxes: also those that are long, or unbounded, and cannot be
+    described by a point."""
     locked, long = list[tuple[Array, Array]](), list[tuple[Array, Array]]()
     low, high = (np.array([each[k] for each in left]).reshape(-1, len(whole)) for k in range(2))
     near = SINGULAR_BOX * whole
@@ -333,8 +333,8 @@ def join_boxes(boxes: Iterable[Sequence[Array]]) -> list[tuple[Array, Array]]:
 
 
 def legs_that_may_lock(setup: ObservedRobot) -> tuple[str, ...]:
-    """The legs whose joints may lock where their closed forms are regular: those with U joints, or with rods side by
-    side; of R and P in a plane, and of one rod between balls, the forms tell all."""
+    """Return the legs whose joints may lock where their closed forms are regular: those with U joints, or with parallel
+    rods; for R and P in a plane, and one rod between S joints, the forms are complete."""
     joints = setup.mechanism.joints
     return tuple(
         leg.label
@@ -383,15 +383,15 @@ def reachable_box(error: PoseError, reach: float) -> tuple[Array, Array, bool]:
 
 
 def _alike(one: CriticalBox, other: CriticalBox, loop: LoopError) -> bool:
-    """Whether two enclosed zeros are at one pose with the same directions of two rods."""
+    """Return True if two enclosed zeros are at one pose with the same directions of two rods."""
     return _meet(one, other, loop, list(range(loop.error.size))) and bool(
         np.abs(one.directions - other.directions).max() < SAME_ENDING
     )
 
 
 def _same(one: CriticalBox, other: CriticalBox, error: JointError) -> bool:
-    """Whether two enclosed zeros are at one pose with the same directions, or opposite ones: enclosures of what is
-    watched meet, of turns by an angle and by half a turn less it as well."""
+    """Return True if two enclosed zeros are at one pose with the same directions, or opposite ones: enclosures of the
+    observed directions meet; rotations that differ by half a turn count as equal."""
     watched = {each.limb for each in error.error.seen}
     own = [*range(error.error.size), *(k for k, i in enumerate(error.joints, error.error.size) if i in watched)]
     apart = np.linalg.norm(np.cross(one.directions, other.directions), axis=1).max(initial=0.0)
@@ -400,13 +400,13 @@ def _same(one: CriticalBox, other: CriticalBox, error: JointError) -> bool:
 
 
 def _meet(one: CriticalBox, other: CriticalBox, error: JointError, own: list[int]) -> bool:
-    """Whether enclosures of two zeros meet in some of the coordinates, but for periods."""
+    """Return True if enclosures of two zeros meet in some of the coordinates, up to periods."""
     away = _away(one.x[own], other.x[own], error.periods[own])
     return bool(np.all(away <= one.radius[own] + other.radius[own] + FOLLOWED))
 
 
 def _away(one: Array, other: Array, periods: Array) -> Array:
-    """How far coordinates (n,) are from others, but for periods."""
+    """Return the distance of coordinates (n,) from others, up to periods."""
     away, turns = np.abs(one - other), np.isfinite(periods)
     away[turns] %= periods[turns]
     away[turns] = np.minimum(away[turns], periods[turns] - away[turns])

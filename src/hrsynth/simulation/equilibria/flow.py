@@ -1,11 +1,11 @@
 """The law of servoing (:mod:`..law`) as a velocity of platform poses, for many poses at once.
 
-With ẋ coordinates of the platform's twist and e_i = u_i × u_di, what the law commands moves the platform with
-ẋ = −S V max(Σ², DAMPED²)⁻¹ Vᵀ S Lᵀ e in time constants 1 / λ: S² is what unit velocities of the joints do to the
-platform, V Σ² Vᵀ = S Lᵀ L S. S counts only where a singular value is below ``DAMPED``, and not for where the law rests.
+With ẋ coordinates of the platform's twist and e_i = u_i × u_di, the command moves the platform with ẋ = −S V max(Σ²,
+DAMPED²)⁻¹ Vᵀ S Lᵀ e in time constants 1 / λ: S² is the response of the platform to unit joint velocities, V Σ² Vᵀ = S
+Lᵀ L S. S counts only where a singular value is below ``DAMPED``, and does not change the equilibria.
 
-A leg that is not watched and is stretched holds the platform (``active``): there ẋ minimises ‖L ẋ + e‖ over the twists
-that keep the leg's reach margin, which is what the law does on the closed loops.
+A stretched unobserved leg constrains the platform (``active``): there ẋ minimises ‖L ẋ + e‖ over the twists that keep
+the leg's reach margin, as the law does on the closed loops.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ Places = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CommandedMotion(Value):
-    """What the law commands at n poses: ẋ (n, d), ‖e‖ (n,), the smallest singular value of L S (n,; as ``damped`` tells
-    it), the legs' reach margins (n, legs) as parts of those at home, whether all but active legs reach (n,), and which
-    active legs hold the platform (n, legs). Where one does not reach there is no command: NaN."""
+    """Command at n poses: ẋ (n, d), ‖e‖ (n,), the smallest singular value of L S (n,; as ``damped`` gives it), the
+    legs' reach margins (n, legs) relative to the zero configuration, a flag that all but active legs reach (n,), and
+    the active legs that constrain the platform (n, legs). NaN if a leg does not reach."""
 
     velocity: Array
     size: Array
@@ -42,7 +42,7 @@ class CommandedMotion(Value):
     reached: Flags
     held: Flags
     u: Array
-    """The watched directions (n, k, 3)."""
+    """Observed directions (n, k, 3)."""
 
     @property
     def moves(self) -> Array:
@@ -52,8 +52,8 @@ class CommandedMotion(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Flow(Value):
-    """The law of a robot whose ``watched`` legs are to have the directions ``desired`` (k, 3); all its legs are closed
-    forms. Which of them are in the other working mode than at home is told at each pose (``flipped``, (n, legs))."""
+    """Law of a robot with desired directions ``desired`` (k, 3) of its observed legs; all its legs are closed forms.
+    ``flipped`` (n, legs) are those in the other working mode than at the zero configuration."""
 
     placer: ConfigurationBuilder
     watched: tuple[str, ...]
@@ -63,7 +63,7 @@ class Flow(Value):
 
     @property
     def batch(self) -> Batch:
-        """The robot in the working mode of home."""
+        """Robot in the working mode of the zero configuration."""
         return self.placer.batch
 
     @property
@@ -73,17 +73,17 @@ class Flow(Value):
 
     @cached_property
     def seen(self) -> Flags:
-        """Which of them are watched."""
+        """Flags of the observed legs."""
         return np.isin(self.legs, self.watched)
 
     @cached_property
     def points(self) -> Flags:
-        """Which legs slide along a line through a fixed point, at which they turn over: no border of reach."""
+        """Flags of the legs that slide along a line through a fixed point, at which they reverse: no limit of reach."""
         return np.array([isinstance(leg, SlidingRod) and not leg.aside for leg in self.batch.legs.values()])
 
     @cached_property
     def pointed(self) -> Flags:
-        """Which of the watched ones do."""
+        """Flags of the observed ones of these."""
         return np.array([self.points[self.legs.index(name)] for name in self.watched])
 
     def at(self, X: Array, flipped: Flags, active: Flags, root: Array) -> CommandedMotion:
@@ -114,7 +114,7 @@ class Flow(Value):
         return CommandedMotion(velocity, size, weakest, margins, reached, held, u)
 
     def margins(self, X: Array, flipped: Flags) -> Array:
-        """The legs' reach margins (n, legs), parts of those at home."""
+        """Return the legs' reach margins (n, legs) relative to the zero configuration."""
         found = np.empty((len(X), len(self.legs)))
         for bits, some in _groups(flipped):
             found[some] = self.mode_placer(bits).batch.rows_at(X[some], ())[0]
@@ -172,7 +172,7 @@ class Flow(Value):
         return found
 
     def bare(self) -> Flow:
-        """The same, with nothing traced yet: to be sent to another process."""
+        """Return a copy without traced programs, to be sent to another process."""
         return replace(self, placer=replace(self.placer, batch=replace(self.batch, programs={})), modes={})
 
     def mode_placer(self, bits: int) -> ConfigurationBuilder:
@@ -196,8 +196,8 @@ class Flow(Value):
 
 
 def damped_inverse(A: Array, g: Array) -> tuple[Array, Array]:
-    """−V max(Σ², DAMPED²)⁻¹ Vᵀ g (n, d) for A = V Σ² Vᵀ (n, d, d), as ``law.damped_inverses``; the smallest of Σ (n,),
-    of which only a lower bound is told from ``FLOW_WEAK`` times ``DAMPED`` on."""
+    """Return −V max(Σ², DAMPED²)⁻¹ Vᵀ g (n, d) for A = V Σ² Vᵀ (n, d, d), as ``law.damped_inverses``; and the smallest
+    of Σ (n,), or a lower bound of it from ``FLOW_WEAK`` times ``DAMPED`` on."""
     d = A.shape[1]
     with np.errstate(all="ignore"):
         found = solve_definite(A, np.concatenate([g[..., None], np.broadcast_to(np.eye(d), A.shape)], axis=2))
@@ -212,8 +212,8 @@ def damped_inverse(A: Array, g: Array) -> tuple[Array, Array]:
 
 
 def _along(normals: Array, A: Array, g: Array) -> tuple[Array, Array, Array]:
-    """The same in the twists on which normals (n, legs, d) vanish; and with how much each leg pushes back (n, legs):
-    A ẋ + g = Nᵀ μ."""
+    """Return the same in the twists on which normals (n, legs, d) vanish; and the reaction of each leg (n, legs): A ẋ +
+    g = Nᵀ μ."""
     found, weakest = np.zeros_like(g), np.zeros(len(g))
     _, values, right = np.linalg.svd(normals)
     ranks = np.sum(values > DAMPED * values[:, :1], axis=1)

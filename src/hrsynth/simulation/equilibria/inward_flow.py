@@ -23,7 +23,7 @@ from .pose_error import PoseError
 
 @dataclass(frozen=True, eq=False)
 class InwardProver:
-    """What encloses J and e over boxes (c, n) of coordinates x of an error."""
+    """Enclosures of J and e over boxes (c, n) of coordinates x of an error."""
 
     error: PoseError
     rates: ConeProver
@@ -52,7 +52,8 @@ class InwardProver:
         return 0.0
 
     def inwards(self, middle: Array, half: Array) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
-        """In which boxes all legs reach, J has full rank and runs lead inwards; along which axis to cut the others."""
+        """Return True for boxes in which all legs reach, J has full rank and runs lead inwards; and the axes along
+        which to cut the others."""
         n, count = middle.shape[1], len(middle)
         x = [affine(middle[:, i], half[:, i, None] * np.eye(n)[i], np.zeros(count)) for i in range(n)]
         found, limbs = self.rates.jacobian.at(x), len(self.error.limbs)
@@ -104,7 +105,8 @@ def inward_radius(error: PoseError, seed: int = 0) -> tuple[float, int]:
 
 
 def _hold_inwards(prover: InwardProver, radius: float, core: float) -> tuple[bool, int]:
-    """Whether runs lead inwards all over the ball outside its core, by boxes that are cut where that is not proved."""
+    """Return True if runs lead inwards all over the ball outside its core, by boxes that are cut where that is not
+    proved."""
 
     def inside(middle: Array, half: Array) -> NDArray[np.bool_]:
         near, far = np.maximum(np.abs(middle) - half, 0.0), np.abs(middle) + half
@@ -124,7 +126,7 @@ def _hold_inwards(prover: InwardProver, radius: float, core: float) -> tuple[boo
 
 
 def _seen_radius(error: PoseError, seed: int) -> float:
-    """How far rays from the goal show that runs lead inwards: seen, not proved."""
+    """Return the largest radius at which rays from the goal show that runs lead inwards (not proved)."""
     n = error.size
     w = np.random.default_rng(seed).normal(size=(RAYS, n))
     w /= np.linalg.norm(w, axis=1)[:, None]

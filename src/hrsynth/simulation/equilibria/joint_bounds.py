@@ -1,4 +1,4 @@
-"""Where a leg's joint can be, in closed form, while its tip is somewhere in a box.
+"""Bounds of a leg's joint, in closed form, while its tip is in a box.
 
 From the joint's centre the tip is at height x along the joint's axis, at a distance h across it, at an angle φ. A
 slider is at x ± √(rod² − h²). A crank is at φ ± arccos((x² + h² + radius² − rod²) / (2 radius h)). A rod that slides
@@ -83,7 +83,7 @@ def _square(x: Bounds) -> Bounds:
 
 
 def _root(low: Array, high: Array) -> Bounds:
-    """Of those that are not negative; no number where all are."""
+    """Return the root of those that are not negative; NaN where all are."""
     doubt = BOX_ROUNDING * (1 + np.abs(high))
     return np.sqrt(np.maximum(low - doubt, 0.0)), np.sqrt(high + doubt)
 
@@ -93,7 +93,8 @@ def _turn(cosine: Array) -> Array:
 
 
 def _angle(one: Bounds, two: Bounds) -> Bounds:
-    """Of points (one, two) in rectangles, about the middle's; all where the centre may be among them."""
+    """Return the angle of points (one, two) in rectangles, about the centre's; all angles where the origin may be among
+    them."""
     middle = (one[0] + one[1]) / 2 + 1j * (two[0] + two[1]) / 2
     off = [np.angle((x + 1j * y) / middle) for x in one for y in two]
     all_round = (one[0] <= 0) & (one[1] >= 0) & (two[0] <= 0) & (two[1] >= 0)
@@ -102,7 +103,8 @@ def _angle(one: Bounds, two: Bounds) -> Bounds:
 
 
 def _share(rest: Array, far: Bounds, radius: float, *, least: bool) -> Array:
-    """A bound of (rest + h²) / (2 radius h), h in ``far``: convex in h with the least at √rest, or growing; widened."""
+    """Return a bound of (``rest`` + h²) / (2 radius h), h in ``far``: convex in h with the least at ``√rest``, or
+    growing; widened."""
     ends = [(rest + h * h) / (2 * radius * h) for h in far]
     if not least:
         found = np.maximum(*ends)

@@ -1,4 +1,4 @@
-"""The error over the platform's pose and the places of the legs' joints, closed by equations: smooth at all limits of
+"""Error over the platform's pose and the coordinates of the legs' joints, closed by equations: smooth at all limits of
 legs.
 
 Coordinates y: shifts of the platform's point, the angle of its turn, and of each leg the angle of its crank or of its
@@ -6,10 +6,10 @@ rod that slides, or the way of its slider. Equations g: the length of a rod, or 
 tip. At a leg's limit g does not change with the leg's own joint; nothing is singular there but the pose as coordinates.
 
 Where all rods slide, poses may be anywhere. A chart of those ``far`` away has P / w in the place of the point, one
-component of P being 1: with all lengths times w the equations are smooth at w = 0, and so are rates
-along (1 / w) ∂/∂ψ, which are taken there. Of a platform that translates in space on rods that slide, a chart about a
-``short`` one has its length d and its direction u in the place of the point, A + d u, A where its length vanishes:
-u = v / |v| with one component of v being 1. E is smooth at d = 0, where the point does not tell u.
+component of P being 1: with all lengths times w the equations are smooth at w = 0, and so are rates along (1 / w) ∂/∂ψ,
+which are taken there. Of a platform that translates in space on rods that slide, a chart about a ``short`` one has its
+length d and its direction u in the place of the point, A + d u, A where its length vanishes: u = v / |v| with one
+component of v being 1. E is smooth at d = 0, where the point does not determine u.
 """
 
 from __future__ import annotations
@@ -48,18 +48,17 @@ of_robot = partial(trace_formula, off=KNOWN_NUMBER)
 
 
 def rodless(error: PoseError) -> Array:
-    """Where the platform's point is as each rod that slides in space has no length, (limbs, 3)."""
+    """Return the platform's point where each sliding rod in space has no length, (legs, 3)."""
     return np.array([limb.centre - limb.tip.constant - error.R @ limb.tip.turned for limb in error.limbs])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class JointError(Value):
-    """The error to a goal in these coordinates; ``joints`` are the limbs with a joint among them, the others are closed
-    forms of the pose; ``far``: which of the shifts is w in a chart of poses far away; ``short``: which limb is so in a
-    chart about it, and which component of v is 1. Other rods without a joint are to be ``shortest`` long at least;
-    the desired directions are those at the ``goal`` (its pose and limbs), from which ``error`` may be turned. Where
-    only poses are asked for at which the error vanishes, that of the ``square`` watched direction may be at right
-    angles to the desired one instead."""
+    """Error to a goal in these coordinates; ``joints`` are the legs with a joint among them, the others are closed
+    forms of the pose; ``far``: the shift that is w in a chart of distant poses; ``short``: the leg that is short in a
+    chart about it, and the component of v that is 1. Other rods without a joint must be ``shortest`` long at least; the
+    desired directions are those at the ``goal`` (its pose and legs), from which ``error`` may be rotated. If only poses
+    without error are searched, the ``square`` observed direction may be at right angles to the desired one instead."""
 
     error: PoseError
     joints: tuple[int, ...]
@@ -71,7 +70,7 @@ class JointError(Value):
 
     @classmethod
     def of(cls, error: PoseError, goal: PoseError | None = None, shortest: float = SHORTEST_ROD) -> JointError:
-        """That about the goal; a rod that slides in a plane turns about the plane's normal."""
+        """Build the error about the goal; a sliding rod in a plane rotates about the plane's normal."""
         limbs = tuple(_in_plane(error, limb) for limb in error.limbs)
         joints = tuple(
             i
@@ -82,8 +81,8 @@ class JointError(Value):
 
     @property
     def charts(self) -> tuple[JointError, ...]:
-        """Those that together hold all poses: this one, and where all rods slide those of poses far away and about
-        short rods; this one alone where that is not so."""
+        """Charts that together hold all poses: this one, and, where all rods slide, those of distant poses and about
+        short rods; else this one alone."""
         if not all(isinstance(each, SlidingRod) for each in self.error.limbs) or any(
             each.limb is None and (each.rule is None or np.any(each.rule.turned)) for each in self.error.seen
         ):
@@ -97,17 +96,17 @@ class JointError(Value):
 
     @property
     def endless(self) -> bool:
-        """Whether these hold all poses however far away."""
+        """Return True if these hold all poses, arbitrarily distant ones included."""
         return len(self.charts) > 1
 
     def list_charts(self, bounded: bool) -> tuple[JointError, ...]:
-        """Those that are to be looked at, of poses that are ``bounded`` by the legs' reach or not."""
+        """Return the charts to search, of poses that are ``bounded`` by the legs' reach or not."""
         return (self,) if bounded else self.charts
 
     @property
     def ends(self) -> Array:
-        """Where the platform's point is, from that of the goal, when rods that slide and turn as they like in space
-        have no length, (limbs, 3); none where length and direction of one do not tell where the platform is."""
+        """Positions of the platform's point, from that of the goal, at which freely rotating sliding rods in space have
+        no length, (legs, 3); none where length and direction of one do not determine the platform's position."""
         error = self.error
         if (
             error.shifts.shape[1] != 3
@@ -119,7 +118,7 @@ class JointError(Value):
 
     @property
     def idle(self) -> list[ClosedFormLeg]:
-        """The limbs that are not watched."""
+        """Unobserved legs."""
         watched = {each.limb for each in self.error.seen}
         return [each for i, each in enumerate(self.error.limbs) if i not in watched]
 
@@ -130,7 +129,8 @@ class JointError(Value):
 
     @property
     def turning(self) -> tuple[int, ...]:
-        """Those of them that turn the platform; and which equations, after all coordinates, ask of these alone."""
+        """Joints of these legs that rotate the platform; and the equations, after all coordinates, that contain these
+        alone."""
         return tuple(range(self.error.shifts.shape[1], self.freedoms))
 
     @property
@@ -140,7 +140,7 @@ class JointError(Value):
 
     @property
     def periods(self) -> Array:
-        """How far apart coordinates (n,) mean the same: a rod through a point may point either way, E is the same."""
+        """Periods of the coordinates (n,): a rod through a point may point either way, E is the same."""
         found = [*(np.inf for _ in self.error.shifts.T), *(2 * np.pi for _ in self.error.turns.T)]
         for i in self.joints:
             limb = self.error.limbs[i]
@@ -186,7 +186,7 @@ class JointError(Value):
         return y
 
     def enclose_chart(self, middle: Array, half: Array) -> tuple[Array, Array]:
-        """What boxes (c, n) hold in the chart about the goal, boundless where w may vanish."""
+        """Return the box in the chart about the goal that holds boxes (c, n), unbounded where w may vanish."""
         if self.short is not None:
             # |∂u/∂v| ≤ 1
             at, off = self.near(middle), half[:, :1] + (np.abs(middle) + half)[:, :1] * half[:, 1:].sum(1)[:, None]
@@ -210,7 +210,7 @@ class JointError(Value):
         return [Dual(y[i], [float(i == j) for j in range(self.size[0])]) for i in places]
 
     def make_constant(self, known: Number) -> Number:
-        """What makes numbers with rates, which vanish, of the robot's numbers and lists of them."""
+        """Return the function that makes numbers with rates, which vanish, of the robot's numbers and lists of them."""
         none = [0.0] * self.size[0]
 
         def number(value: Any) -> Any:
@@ -219,8 +219,8 @@ class JointError(Value):
         return number
 
     def parts(self, y: Sequence[Any], known: Number) -> tuple[list[Dual], list[Sequence[Dual]], list[Dual]]:
-        """g, the observed directions, and of limbs without a joint the reach margins less what a rod is to be long (of
-        those far away times w²), with their rates by the coordinates (n,), of which ``known`` makes numbers as well."""
+        """Return g, the observed directions, and of legs without a joint the reach margins minus the rod's least length
+        (of distant ones times w²), with their rates by the coordinates (n,), which ``known`` makes numbers too."""
         error, number = self.error, self.make_constant(known)
         w, point, turned, u = self._place_platform(y, known, number)
         g, margins, told = list[Dual](), list[Dual](), list[Sequence[Dual]]()
@@ -309,7 +309,7 @@ class JointError(Value):
 
     @cached_property
     def ways(self) -> BoxFormula:
-        """Of each limb with a joint the tip from the centre: along the axis, and across it
+        """Vectors of each leg with a joint from the centre to the tip: along the axis, and across it
         (:func:`orthogonal_directions`)."""
         error = self.error
 
@@ -339,7 +339,7 @@ class JointError(Value):
 
     @cached_property
     def asked(self) -> BoxFormula:
-        """What vanishes where only such poses are asked for."""
+        """Components that vanish where only poses without error are searched."""
         return of_robot(
             lambda y, number: [
                 each.value
@@ -364,7 +364,7 @@ class JointError(Value):
 
     @cached_property
     def slopes(self) -> BoxFormula:
-        """g (k), its rates (k n), those of E (n), the reach margins of limbs without a joint."""
+        """g (k), its rates (k n), those of E (n), the reach margins of legs without a joint."""
         n, _ = self.size
 
         def formula(y: Sequence[Any], number: Number) -> list[Any]:
@@ -381,8 +381,9 @@ class JointError(Value):
 
     @cached_property
     def apart(self) -> list[tuple[int, list[int]]]:
-        """Of each point of the platform about which it turns on which legs act, one of these, and those that act
-        elsewhere; none where not all legs have joints and are watched: a leg that is not would push at its limit."""
+        """Indices, for each point of the platform about which it rotates and on which legs act, of one of these legs,
+        and of those that act elsewhere; none unless all legs have joints and are observed: an unobserved leg would push
+        at its limit."""
         if self.far is not None or self.short is not None or self.error.turns.shape[1] != 1:
             return []
         if not set(range(len(self.error.limbs))) == set(self.joints) == {each.limb for each in self.error.seen}:
@@ -397,8 +398,8 @@ class JointError(Value):
 
     @cached_property
     def moments(self) -> BoxFormula:
-        """Moments that vanish at a critical point: those about a watched leg's tip, to which the legs there add
-        nothing. That of a leg is c (∂c g_θ − c_θ ∂g) / g_θ along a turn about the tip, all times all g_θ."""
+        """Moments that vanish at a critical point: those about an observed leg's tip, to which the legs there add
+        nothing. That of a leg is c (∂c g_θ − c_θ ∂g) / g_θ along a rotation about the tip, all times all g_θ."""
 
         def formula(y: Sequence[Any], number: Number) -> list[Any]:
             error, k, found = self.error, self.error.shifts.shape[1], list[Any]()
@@ -432,7 +433,8 @@ class JointError(Value):
 
     @cached_property
     def bends(self) -> BoxFormula:
-        """Of coordinates and multipliers: the derivatives by the coordinates of ∇E + μ ∇g (n n) and of g (k n)."""
+        """Derivatives of ∇E + μ ∇g (n n) and of g (k n) by the coordinates, as functions of coordinates and
+        multipliers."""
         n, k = self.size
         none = [0.0] * n
 

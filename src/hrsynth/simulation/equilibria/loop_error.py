@@ -1,12 +1,12 @@
-"""Rests of a loop of two watched legs, by the direction of the force that closes it.
+"""Equilibria of a loop of two observed legs, by the direction of the force that closes it.
 
 Two rods u₁, u₂ of constant length, their cranks or sliders and the platform between them close one vector equation,
-each term of which has variables of its own: r₁ u₁ + k + Σ f_j(q_j) = r₂ u₂. At a rest of E = ½ Σ (1 − (u_i · u_i*)²)
-there is a λ = |λ| n with n · f_j′(q_j) = 0 and, c_i = u_i · u_i*, with c₁ u₁* − r₁ λ along u₁, c₂ u₂* + r₂ λ along u₂.
-Where λ vanishes each u_i is along u_i* or at right angles to it. Elsewhere n, u₁ and u₁* lie in one plane. In polar
-coordinates about u₁*, n = cos t u₁* + sin t w(β), u₁ = cos θ u₁* + sin θ w(β), this is smooth; and with the joints as
-unknowns, which g_j = n · f_j′ tells, nothing is special where n lies along an axis. The closure tells u₂, which is a
-unit vector, lies in a plane with n and u₂*, and asks for the same |λ|:
+each term of which has variables of its own: r₁ u₁ + k + Σ f_j(q_j) = r₂ u₂. At an equilibrium of
+E = ½ Σ (1 − (u_i · u_i*)²) there is a λ = |λ| n with n · f_j′(q_j) = 0 and, c_i = u_i · u_i*, with c₁ u₁* − r₁ λ along
+u₁, c₂ u₂* + r₂ λ along u₂. Where λ vanishes each u_i is along u_i* or at right angles to it. Elsewhere n, u₁ and u₁*
+lie in one plane. In polar coordinates about u₁*, n = cos t u₁* + sin t w(β), u₁ = cos θ u₁* + sin θ w(β), this is
+smooth; and with the joints as unknowns, determined by g_j = n · f_j′, nothing is special where n lies along an axis.
+The closure gives u₂, a unit vector in a plane with n and u₂*, with the same |λ|:
 r₁ sin(t − θ) c₂ (u₂* × u₂) = r₂ cos θ sin θ (n × u₂).
 """
 
@@ -32,13 +32,13 @@ from .pose_error import NotEnclosed, Number, PoseError
 from .subdivision import CriticalBox, Subdivision, forms_of, hull
 
 NARROWINGS = 16
-"""How many times the place of a zero is narrowed."""
+"""Number of times that the place of a zero is narrowed."""
 
 
 @dataclass(frozen=True, eq=False)
 class Term:
-    """What a joint adds to the closure: ``size`` times a unit vector at right angles to ``axis`` that turns from
-    ``one``, or ``size`` times its travel along ``axis`` where that is None."""
+    """Contribution of a joint to the closure: ``size`` times a unit vector at right angles to ``axis`` that rotates
+    from ``one``, or ``size`` times its travel along ``axis`` if that is None."""
 
     size: float
     axis: Array
@@ -57,21 +57,21 @@ class Term:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LoopError(JointError):
-    """The equations over β (in space), t, θ and the joints of the terms; ``joints`` are the watched limbs."""
+    """Equations over β (in space), t, θ and the joints of the terms; ``joints`` are the observed legs."""
 
     @classmethod
     def about(cls, error: PoseError) -> LoopError:
-        """Those of a pose's error; raises ``NotEnclosed`` where it is that of no such loop."""
+        """Build the equations of a pose's error; raises ``NotEnclosed`` if it is not that of such a loop."""
         joints = tuple(each.limb for each in error.seen if each.limb is not None)
         if (
             len(error.seen) != 2
             or len(set(joints)) != 2
             or not all(isinstance(error.limbs[i], OnCrank | OnRail) for i in joints)
         ):
-            raise NotEnclosed("not two rods of constant length are watched")
+            raise NotEnclosed("the observed legs are not two rods of constant length")
         found = cls(error, joints, error, shortest=0.0)
         if error.turns.shape[1] > 1 or any(abs(each.size) < EXACT for each in found.terms):
-            raise NotEnclosed("the watched legs do not tell how the platform turns")
+            raise NotEnclosed("the observed legs do not determine the platform's rotation")
         if error.shifts.shape[1] == 2:
             normal = np.cross(*error.shifts.T)
             off = [
@@ -82,18 +82,18 @@ class LoopError(JointError):
                 ),
             ]
         if error.shifts.shape[1] not in (2, 3) or (error.shifts.shape[1] == 2 and np.abs(off).max() > FOLLOWED):
-            raise NotEnclosed("the legs move neither in a plane nor in space")
+            raise NotEnclosed("the motion is neither planar nor spatial")
         return found
 
     @cached_property
     def over_pose(self) -> JointError:
-        """The same error over the pose and the joints of the watched limbs."""
+        """Same error over the pose and the joints of the observed legs."""
         return JointError(self.error, self.joints, self.error, shortest=0.0)
 
     @property
     def flat(self) -> int:
-        """How many watched directions are at right angles to the desired ones, the others along theirs, where rests
-        without a force fill curves or surfaces in space."""
+        """Number of observed directions at right angles to the desired ones, the others along theirs, at which
+        equilibria without a force form curves or surfaces in space."""
         return 1 if self.error.size > self.error.shifts.shape[1] else 2
 
     @cached_property
@@ -103,7 +103,7 @@ class LoopError(JointError):
 
     @cached_property
     def terms(self) -> list[Term]:
-        """Those of the cranks or sliders, and of the platform's turn."""
+        """Terms of the cranks or sliders, and of the platform's rotation."""
         found, error = list[Term](), self.error
         for sign, i in zip((1.0, -1.0), self.joints, strict=True):
             limb = error.limbs[i]
@@ -121,7 +121,7 @@ class LoopError(JointError):
 
     @property
     def _arm(self) -> Array:
-        """From the second tip to the first at the goal, as far as it turns."""
+        """Vector from the second tip to the first at the goal, as far as it rotates."""
         one, two = (self.error.limbs[i].tip.turned for i in self.joints)
         return np.asarray(self.error.R @ (one - two))
 
@@ -140,11 +140,11 @@ class LoopError(JointError):
 
     @property
     def size(self) -> tuple[int, int]:
-        """Coordinates, and those of the equations that tell joints."""
+        """Numbers of coordinates, and of the equations that determine joints."""
         return self.freedoms + len(self.terms), len(self.terms)
 
     def box(self, low: Array, high: Array, reach: float) -> tuple[Array, Array]:
-        """The corners: n is meant but for its sign, and the sign of w."""
+        """Return the corners of the box: n counts up to its sign, and the sign of w."""
         most = np.array([*(np.pi / 2 for _ in range(self.freedoms - 1)), np.pi])
         inner, outer = self.over_pose.box(low, high, reach)
         places = [*range(self.error.size, len(inner)), *range(self.freedoms, self.error.size)]
@@ -171,7 +171,7 @@ class LoopError(JointError):
         return [n, rod, scale(number(1 / two.rod), tip)], g
 
     def rest(self, y: Sequence[Any], number: Number) -> list[Any]:
-        """What is left beside g: the length of u₂; the force, across u₂; in space the plane of u₂."""
+        """Return the equations beside g: the length of u₂; the force, across u₂; in space the plane of u₂."""
         one, two = (self.error.limbs[i] for i in self.joints)
         assert isinstance(one, OnCrank | OnRail)
         assert isinstance(two, OnCrank | OnRail)
@@ -193,7 +193,7 @@ class LoopError(JointError):
 
     @cached_property
     def left(self) -> BoxFormula:
-        """What is left beside g."""
+        """Equations beside g."""
         return of_robot(self.rest, self.size[0])
 
     @cached_property
@@ -218,7 +218,7 @@ class LoopError(JointError):
 
     @cached_property
     def ways(self) -> BoxFormula:
-        """Of each joint that turns, n along its axis and across it."""
+        """Vectors of each rotating joint: n along its axis and across it."""
 
         def formula(y: Sequence[Any], number: Number) -> list[Any]:
             n = self.vectors([*y, *(0.0 for _ in self.terms)], number)[0][0]
@@ -233,7 +233,7 @@ class LoopError(JointError):
 
     @cached_property
     def told(self) -> BoxFormula:
-        """Coordinates about the goal: shifts, the turn, the joints of the watched limbs."""
+        """Coordinates about the goal: shifts, the rotation, the joints of the observed legs."""
 
         def formula(y: Sequence[Any], number: Number) -> list[Any]:
             error, m = self.error, self.freedoms
@@ -262,8 +262,8 @@ class LoopError(JointError):
 
 
 class LoopSubdivision(Subdivision):
-    """Boxes of these coordinates. At most one rest with a λ lies in each box that is settled as a zero; that there is
-    one is proved over the pose."""
+    """Boxes of these coordinates. At most one equilibrium with a λ lies in each box that is settled as a zero; that
+    there is one is proved over the pose."""
 
     error: LoopError
 
@@ -298,9 +298,8 @@ class LoopSubdivision(Subdivision):
         return F, AffineForms(K.v.reshape(-1, *shape), K.r.reshape(shape))
 
     def _report(self, x: Array, reach: Array, frame: Array) -> list[CriticalBox]:
-        """The rests at zeros, each once: over the pose exactly one is proved in a box that holds all that lie in that
-        of the zero. Those are left out which a leg that is not watched does not reach; what is not decided is left
-        open."""
+        """Return the equilibria at zeros, each once: over the pose exactly one is proved in a box that holds all that
+        lie in that of the zero. Those that an unobserved leg does not reach are left out; undecided ones stay open."""
         over, kept, reach = self.error.over_pose, list[int](), self._narrow_zeros(x)
         y, (low, high) = np.mean(self.error.enclose_chart(x, 0 * x), axis=0), self.error.enclose_chart(x, reach)
         room = np.maximum(high - y, y - low)
@@ -329,8 +328,8 @@ class LoopSubdivision(Subdivision):
         return zeros
 
     def _narrow_zeros(self, x: Array) -> Array:
-        """How far from places (c, n) zeros are. With more equations than unknowns there need be none: what is told of
-        it is narrowed, from the whole room."""
+        """Return the distance of zeros from places (c, n). With more equations than unknowns there need be none: the
+        bound is narrowed from the whole box."""
         at, room, frame = self._rooms()
         reach = hull(room, frame) + np.abs(x - at)
         for _ in range(NARROWINGS):

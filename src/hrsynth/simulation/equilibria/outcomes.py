@@ -1,4 +1,4 @@
-"""How single runs end, and which of them end alike."""
+"""Outcomes of single runs, and comparison of outcomes."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from .flow import Flags, Places
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Outcome(Value):
-    """How a run ended that was simulated one by one; where it came to rest the platform's pose X (4, 4) and ‖e‖."""
+    """Outcome of a run that was simulated separately; if it converged, the platform's pose X (4, 4) and ‖e‖."""
 
     ending: RunOutcome
     X: Array | None = None
     size: float = np.inf
 
     def alike(self, other: Outcome, length: float) -> bool:
-        """Whether two runs end alike: at one pose, or for one reason."""
+        """Return True if two runs have the same outcome: one pose, or one reason."""
         if self.X is None or other.X is None or self.ending.name != other.ending.name:
             said = [
                 (each.ending.name, each.ending.reason if each.ending.name == BOUNDARY else "", each.X is None)
@@ -48,7 +48,7 @@ class OutcomeCount:
 
 
 class Outcomes:
-    """Outcomes that are told apart."""
+    """Distinct outcomes."""
 
     def __init__(self, length: float) -> None:
         self.all: list[Outcome] = []

@@ -1,8 +1,8 @@
-"""The error to a goal of a platform on rods that slide, each of which keeps a point of it in a plane of the base: the
-parts of its pose depend on each other.
+"""Error to a goal of a platform on rods that slide, each of which keeps a point of it in a plane of the base: the parts
+of its pose depend on each other.
 
 The planes are n_i · (p + R b_i) = h_i, N has the rows n_i. So p = N⁺ (h_i − n_i · R b_i)_i + D s, with D the directions
-that all planes share. Where rows depend on each other, Σ λ_i n_i = 0, this asks Σ λ_i (n_i · R b_i − h_i) = 0 of R
+that all planes share. Where rows depend on each other, Σ λ_i n_i = 0, Σ λ_i (n_i · R b_i − h_i) = 0 is a condition on R
 alone: a quadratic form of its quaternion q. One of rank two with both signs is a product of two factors: there are two
 families of poses, q at right angles to a vector, both smooth, which meet where both factors vanish. Another form is one
 equation more. Where families meet, what is critical in one need not be so in the other.
@@ -42,8 +42,8 @@ from .pose_system import bends
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PlaneError(JointError):
-    """That of one family, in a chart. The whole ``error`` counts three shifts and three turns; of the goal's point the
-    platform's is ``offset`` + ``follow`` · R (by rows) + ``along`` · s away."""
+    """Error of one family, in a chart. The whole ``error`` counts three shifts and three rotations; the platform's
+    point has the distance ``offset`` + ``follow`` · R (by rows) + ``along`` · s from the goal's."""
 
     offset: Array = field(kw_only=True)
     follow: Array = field(kw_only=True)
@@ -53,18 +53,18 @@ class PlaneError(JointError):
     forms: Array = field(kw_only=True)
     """Quadratic forms (l, 4, 4) of quaternions that vanish."""
     one: int = field(default=0, kw_only=True)
-    """Which component is 1."""
+    """Component that is 1."""
 
     @classmethod
     def families(cls, setup: ObservedRobot, goal: ClosedConfiguration) -> list[PlaneError]:
-        """Those of all poses of such a platform; raises ``NotEnclosed``."""
+        """Return the errors of all families of poses of such a platform; raises ``NotEnclosed``."""
         require_directions(setup)
         configurations, observation_model = (
             [setup.all_samples.start, *setup.configurations],
             setup.samples.observation_model,
         )
         motion = PlatformMotion.of(configurations, replace(observation_model, observations=()))
-        depends = NotEnclosed("the parts of the platform's pose that change depend on each other")
+        depends = NotEnclosed("the variable parts of the platform's pose depend on each other")
         legs = setup.decomposition.legs
         normals = [_normal(setup.mechanism, leg) for leg in legs]
         if not motion.body or motion.twists.shape[1] < 6 or any(normal is None for normal in normals):
@@ -116,7 +116,7 @@ class PlaneError(JointError):
 
     @property
     def charts(self) -> tuple[JointError, ...]:
-        """Those that together hold all poses of the family."""
+        """Charts that together hold all poses of the family."""
         near = [replace(self, one=k) for k in range(self.span.shape[1])]
         return (*near, *(replace(each, far=k) for each in near for k in range(self.along.shape[1])))
 
@@ -124,7 +124,7 @@ class PlaneError(JointError):
         return self.charts
 
     def holds(self, R: Array) -> bool:
-        """Whether a rotation is one of the family, as near as two are told apart."""
+        """Return True if a rotation is in the family, up to the tolerance of equal rotations."""
         q = quaternions(R)
         return bool(np.abs(q - self.span @ (self.span.T @ q)).max() < SAME_ENDING)
 
@@ -187,7 +187,7 @@ class PlaneError(JointError):
         return found
 
     def parts(self, y: Sequence[Any], known: Number) -> tuple[list[Dual], list[Sequence[Dual]], list[Dual]]:
-        """As for a pose that is free; and the forms that vanish."""
+        """Return the parts as for a free pose; and the forms that vanish."""
         g, seen, margins = super().parts(y, known)
         if len(self.forms):
             q, number = self.unknowns(y, range(self.along.shape[1], self.freedoms)), self.make_constant(known)
@@ -201,7 +201,7 @@ class PlaneError(JointError):
 
     @property
     def periods(self) -> Array:
-        """Of what :meth:`enclose_chart` tells."""
+        """Periods of the results of :meth:`enclose_chart`."""
         return np.append(np.full(6, np.inf), super().periods[6:])
 
     @cached_property
@@ -221,7 +221,7 @@ class PlaneError(JointError):
         return trace_formula(formula, self.freedoms)
 
     def enclose_chart(self, middle: Array, half: Array) -> tuple[Array, Array]:
-        """What boxes (c, n) hold: shifts from the goal, axes of the turn times its sine, joints."""
+        """Return shifts from the goal, axes of the rotation times its sine, and joints of boxes (c, n)."""
         f, eye = self.freedoms, np.eye(self.freedoms)
         forms = [
             affine(middle[:, i], half[:, i, None] * eye[i], AFFINE_ROUNDING * (1 + np.abs(middle[:, i])))
@@ -281,7 +281,7 @@ def factors(span: Array, forms: Sequence[Array]) -> Iterator[tuple[Array, list[A
     elif values[large].min() < 0 < values[large].max():
         yield from ((own, [first, *left]) for own, left in factors(span, rest))
     elif not large.all():
-        raise NotEnclosed("poses at which planes of legs touch each other")
+        raise NotEnclosed("planes of legs are tangent to each other at some poses")
 
 
 def _normal(mechanism: Mechanism, leg: Leg) -> Array | None:

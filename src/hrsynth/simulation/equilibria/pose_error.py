@@ -64,12 +64,12 @@ class Twist:
 
 
 class NotEnclosed(Exception):
-    """Why the error has no enclosure over poses: the reason, for the answer."""
+    """Reason why the error has no enclosure over poses."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ObservedDirection(Value):
-    """An observed direction: ``sense`` times that of a limb's rod, or (``limb`` None) one that the pose turns."""
+    """Observed direction: ``sense`` times that of a leg's rod, or (``limb`` None) one that the pose rotates."""
 
     leg: str
     sense: float
@@ -118,8 +118,8 @@ class ErrorRates:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PoseError(Value):
-    """The error about a goal, in its working mode: the pose (``p``, ``R``) from which coordinates count, by default the
-    goal's, the basis of shifts (3, k) and of turns (3, m), all limbs, what is observed. Lengths in characteristic
+    """Error about a goal, in its working mode: the pose (``p``, ``R``) from which coordinates count, by default the
+    goal's, the basis of shifts (3, k) and of rotations (3, m), all legs, the observations. Lengths in characteristic
     lengths."""
 
     length: float
@@ -131,18 +131,18 @@ class PoseError(Value):
     limbs: tuple[ClosedFormLeg, ...]
     seen: tuple[ObservedDirection, ...]
     fitted: tuple[str, ...] = ()
-    """What was fitted to samples and not read from the joints."""
+    """Forms that were fitted to samples, not read from the joints."""
     limits: tuple[str, ...] = ()
-    """Joints whose limits are not looked at."""
+    """Joints whose limits are ignored."""
     coordinates: PathCoordinates | None = None
-    """What reads poses of configurations."""
+    """Reader of poses of configurations."""
 
     @classmethod
     def of(cls, setup: ObservedRobot, goal: ClosedConfiguration) -> PoseError:
-        """That of what is observed, about a configuration; raises ``NotEnclosed``."""
+        """Build the error of the observations about a configuration; raises ``NotEnclosed``."""
         require_directions(setup)
         configurations = [setup.all_samples.start, *setup.configurations]
-        reason = "the parts of the platform's pose that change depend on each other"
+        reason = "the variable parts of the platform's pose depend on each other"
         for each in path_coordinates(setup.decomposition, setup.samples.observation_model, setup.dof, configurations):
             try:
                 return cls.along(setup, goal, each)
@@ -152,12 +152,12 @@ class PoseError(Value):
 
     @classmethod
     def along(cls, setup: ObservedRobot, goal: ClosedConfiguration, coordinates: PathCoordinates) -> PoseError:
-        """That over what changes in the platform's pose; raises ``NotEnclosed``, or ``NoLegForm`` where a leg has
-        none."""
+        """Build the error over the variable part of the platform's pose; raises ``NotEnclosed``, or ``NoLegForm`` if a
+        leg has none."""
         configurations, mechanism = [setup.all_samples.start, *setup.configurations], setup.mechanism
         motion = coordinates.motion
         known = pattern(setup.decomposition, [], coordinates, configurations)
-        # a leg on whose rail the point itself lies asks for nothing: the point's one shift goes along it
+        # a leg on whose rail the point itself lies gives no condition: the point's one shift is along the rail
         pairs = [
             (limb, carried)
             for limb, carried in zip(known.forms(goal).subchains, known.carried, strict=True)
@@ -214,7 +214,7 @@ class PoseError(Value):
         return signs
 
     def at(self, x: Components, directions: Sequence[Components], number: Number) -> ErrorRates:
-        """What the error does at coordinates x, and along directions of the coordinates."""
+        """Return the rates of the error at coordinates x, and along directions of the coordinates."""
         p, R = self.pose(x, number)
         goal = number(self.p), number(self.R.ravel())
         twists = [self._twist(x, R, each, number) for each in directions]
@@ -222,7 +222,7 @@ class PoseError(Value):
         return ErrorRates(margins, [self._turning(each, (p, R), goal, twists, number) for each in self.seen])
 
     def levels(self, x: Array) -> tuple[NDArray[np.bool_], Array]:
-        """Whether all legs reach, and E, (n,), at coordinates (n, size)."""
+        """Return whether all legs reach, and E, (n,), at coordinates (n, size)."""
         with np.errstate(all="ignore"):
             found = self.at(list(x.T), [], _plain)
             reached = np.ones(len(x), dtype=bool)
@@ -242,7 +242,7 @@ class PoseError(Value):
         return np.array(e).T, np.array(rates).transpose(2, 1, 0)
 
     def _twist(self, x: Components, R: Components, rates: Components, number: Number) -> Twist:
-        """What rates of the coordinates move."""
+        """Return the twist that belongs to rates of the coordinates."""
         k = self.shifts.shape[1]
         w: Components | None = None
         if self.turns.shape[1]:
@@ -251,7 +251,7 @@ class PoseError(Value):
         return Twist(combination(rates[:k], self.shifts, number), w)
 
     def _tip(self, limb: ClosedFormLeg, p: Components, R: Components, number: Number) -> tuple[Components, Components]:
-        """A limb's tip, and the tip from the point."""
+        """Return a leg's tip, and the tip relative to the point."""
         arm: Components = transform_vector(R, number(limb.tip.turned)) if np.any(limb.tip.turned) else [0.0, 0.0, 0.0]
         return plus(plus(p, number(limb.tip.constant)), arm), arm
 
@@ -277,7 +277,7 @@ class PoseError(Value):
         return Turning(u, wanted, [scale(gain, y) for y in tips], [gain * dot(u, y) for y in tips], slip, along)
 
     def _direction(self, seen: ObservedDirection, p: Components, R: Components, number: Number) -> Components:
-        """An observed direction at a pose, in its limb's working mode."""
+        """Return an observed direction at a pose, in its leg's working mode."""
         if seen.rule is not None:
             return plus(transform_vector(R, number(seen.rule.turned)), number(seen.rule.constant))
         assert seen.limb is not None
@@ -292,13 +292,13 @@ class PoseError(Value):
 
 
 def require_directions(setup: ObservedRobot) -> None:
-    """Raises ``NotEnclosed`` where something else is measured than directions, seen from the base."""
+    """Raise ``NotEnclosed`` unless directions are measured from the base."""
     mechanism = setup.mechanism
     others = [each for each in setup.observed if not isinstance(each, Direction)]
     if others:
-        raise NotEnclosed(f"of leg {others[0].leg} something other than a direction is measured")
+        raise NotEnclosed(f"the observation of leg {others[0].leg} is not a direction")
     if mechanism.reference != mechanism.base or any(each.seen_from is not None for each in setup.observed):
-        raise NotEnclosed("directions are not seen from the base")
+        raise NotEnclosed("directions are not measured from the base")
     if mechanism.couplings:
         raise NotEnclosed("joints are coupled")
 
@@ -310,7 +310,7 @@ def _seen_direction(
     read: JointRules,
     configurations: Sequence[ClosedConfiguration],
 ) -> ObservedDirection:
-    """Which limb's rod an observed direction is, at all configurations; raises ``NotEnclosed``."""
+    """Return the leg whose rod has an observed direction at all configurations; raises ``NotEnclosed``."""
     assert isinstance(observation, Direction)
     feature = BodyVector("u", "observed", observation.link, observation.direction)
     u = feature.value(poses_at(configurations, feature.links))
@@ -327,8 +327,8 @@ def _seen_direction(
     if rule is not None and not rule.follows:
         # what does not turn with the platform is the same everywhere
         if known.coordinates.turning and np.any(rule.turned) and np.any(rule.constant):
-            raise NotEnclosed(f"the direction of link {observation.link} turns in part with the platform")
+            raise NotEnclosed(f"the direction of link {observation.link} rotates partly with the platform")
         return ObservedDirection(observation.leg, 1.0, None, rule)
     raise NotEnclosed(
-        f"the direction of link {observation.link} of leg {observation.leg} is not that of a rod whose form is known"
+        f"the direction of link {observation.link} of leg {observation.leg} is not that of a rod in closed form"
     )

@@ -56,11 +56,11 @@ class Piece(Value):
 
     @property
     def free(self) -> bool:
-        """Whether it is a rod with a length and a direction of its own."""
+        """Return True if it is a rod with its own length and direction."""
         return self.held and self.limb is not None and unbound(self.limb)
 
     def own(self, y: Array) -> Array:
-        """Its own coordinates (c, j)."""
+        """Coordinates of the leg (c, j)."""
         return y[:, self.place or slice(0)]
 
     @cached_property
@@ -102,7 +102,7 @@ class Piece(Value):
         return sense * limb.mode * way / np.linalg.norm(way, axis=1)[:, None]
 
     def cosine(self, t: Array, o: Array) -> LocalDerivatives:
-        """That between the observed direction and the desired one."""
+        """Return the cosine between the observed direction and the desired one."""
         assert self.seen is not None
         limb, w, sense = self.limb, self.wanted, self.seen.sense
         u = self.direction(t, o)
@@ -128,7 +128,7 @@ class Piece(Value):
         return LocalDerivatives(k * c, k * away / size, 0.0, k * twice)
 
     def equations(self, t: Array, o: Array) -> list[LocalDerivatives]:
-        """What vanishes."""
+        """Return the equations, which vanish at a solution."""
         limb = self.limb
         if self.place is None:
             return []
@@ -173,7 +173,7 @@ class Piece(Value):
 
 
 def unbound(limb: ClosedFormLeg) -> bool:
-    """Whether it is a rod that slides through a base point and turns as it likes."""
+    """Return True if it is a rod that slides through a base point and rotates freely."""
     return isinstance(limb, SlidingRod) and limb.axis is None
 
 
@@ -183,7 +183,7 @@ def _dot(a: Array, b: Array) -> Array:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LegSystem(Value):
-    """The legs that are watched, and those that are ``held`` at their limits or, of rods that slide, free."""
+    """Observed legs, and those that are ``held`` at their limits or, of sliding rods, free."""
 
     error: PoseError
     held: tuple[int, ...]
@@ -194,7 +194,7 @@ class LegSystem(Value):
 
     @classmethod
     def of(cls, error: PoseError, held: tuple[int, ...]) -> LegSystem:
-        """That of an error to a goal."""
+        """Build the system of an error to a goal."""
         k, m = error.shifts.shape[1], error.turns.shape[1]
         quaternion = slice(k, k + (m + 1 if m else 0))
         pieces, place, count = list[Piece](), quaternion.stop, 1 if m else 0
@@ -257,7 +257,7 @@ class LegSystem(Value):
         return np.asarray(self.error.p + y[:, : self.quaternion.start] @ self.error.shifts.T)
 
     def tip(self, piece: Piece, y: Array) -> Array:
-        """Its tip (c, 3)."""
+        """Return the tip of a leg (c, 3)."""
         q = y[:, self.quaternion]
         arm = np.einsum("kij,ci,cj->ck", piece.bends, q, q) if q.shape[1] else piece.bends[:, 0, 0]
         return np.asarray((self.point(y) if piece.follows else 0.0) + piece.constant + arm + np.zeros((len(y), 3)))
@@ -278,7 +278,8 @@ class LegSystem(Value):
         )
 
     def is_reached(self, y: Array) -> NDArray[np.bool_]:
-        """Whether all other limbs reach, and no held leg's crank can stand anywhere as its tip is on its axis, (c,)."""
+        """Return True where all other legs reach, and no fixed leg's crank is free because its tip is on its axis,
+        (c,)."""
         error, good = self.error, np.ones(len(y), dtype=bool)
         for piece in self.pieces:
             if piece.held and not piece.free:
@@ -409,7 +410,7 @@ class PoseEquations:
 
 
 def _along(local: LocalDerivatives, T: Array, place: slice | None) -> Array:
-    """Its gradient (c, N)."""
+    """Return the gradient (c, N)."""
     found = np.einsum("ck,ckn->cn", local.t, T)
     if place is not None:
         found[:, place] += np.reshape(local.o, (-1, place.stop - place.start))
@@ -417,7 +418,7 @@ def _along(local: LocalDerivatives, T: Array, place: slice | None) -> Array:
 
 
 def _quaternions(turns: Array) -> Array:
-    """Those (4, m + 1) whose vector is in the span of turns (3, m)."""
+    """Return the quaternions (4, m + 1) whose vector is in the span of rotations (3, m)."""
     basis = np.zeros((4, turns.shape[1] + 1))
     basis[0, 0], basis[1:, 1:] = 1.0, turns
     return basis

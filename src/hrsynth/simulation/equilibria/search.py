@@ -1,5 +1,4 @@
-"""Critical points of the error on closed loops, sought from many starts at once and told apart. Nothing here proves
-anything."""
+"""Search for critical points of the error on closed loops, from many starts at once. Nothing here is a proof."""
 
 from __future__ import annotations
 
@@ -43,13 +42,14 @@ from .descent import CriticalPoint, are_closed, close_loops, descend, walk_at_ra
 from .error import CriticalPointEquations, DirectionTerm, ErrorSystem
 
 BESIDE = 0.5
-"""So many times as many starts lie a few random steps beside rests that were found, where there are no closed forms."""
+"""Factor for the number of starts a few random steps beside equilibria already found, if there are no closed forms."""
 WIDEST_SLIDE = 2.5
 """Coordinate of a slide (characteristic lengths) up to which one is drawn, or farther where its limits are."""
 SLIDE_STEPS = 3
 """Gauss and Newton's steps of slides alone: one does where the equations are linear in these."""
 FAMILY_TRIES = 8
-"""Points of one continuum, at most, of which one is to lie in the operation mode of the zero configuration."""
+"""Largest number of points of one continuous family, of which one must lie in the operation mode of the zero
+configuration."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -62,10 +62,10 @@ class CountedCriticalPoint(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CriticalPoints(Value):
-    """What a search found: isolated critical points, and of those that fill curves or surfaces one for each value of E
-    and signs of the curvatures; how many ``starts`` there were, and how many of the isolated ones the last half of them
-    found first (``late``); how many only the search over the platform's pose found (``posed``), and an estimate of how
-    many more there are at least that such starts lead to (``unmet``, None where there was no such search)."""
+    """Results of a search: isolated critical points, and of continuous families one for each value of E and signs of
+    the curvatures; the number of ``starts``, how many of the isolated ones the last half of them found first
+    (``late``), how many only the search over the platform's pose found (``posed``), and a lower bound of the number
+    that such starts missed (``unmet``, None without such a search; an estimate)."""
 
     isolated: tuple[CountedCriticalPoint, ...]
     continua: tuple[CountedCriticalPoint, ...]
@@ -77,7 +77,7 @@ class CriticalPoints(Value):
 
     @property
     def words(self) -> str:
-        """What was done, and how well it covers."""
+        """Return the number of starts and an estimate of the coverage."""
         also = f", {self.posed} more over the platform's pose" if self.posed else ""
         also += f"; estimated, by how often each was met: at least {self.unmet} more" if self.unmet else ""
         return (
@@ -135,7 +135,7 @@ def critical_points(
     for q in islice(rounds or starts(system, homes, seed, setup), most):
         report("starts")
         if lies_near and known.count:
-            # rests lie near each other
+            # equilibria lie near each other
             own = np.array([each.point.q for each in known.isolated])
             some = own[rng.integers(len(own), size=round(BESIDE * len(q)))]
             q = np.concatenate([q, walk_at_random(system, some, rng, 1 + len(fresh) % 3)])
@@ -159,8 +159,8 @@ def critical_points(
 
 
 class DistinctPoints:
-    """Critical points, told apart; those that are not isolated by E and the signs of the curvatures. Where joints are
-    free to move though the platform rests, one is kept that is beyond as few limits as any that was met."""
+    """Distinct critical points; those that are not isolated by E and the signs of the curvatures. If joints are free to
+    move while the platform does not, the one within most joint limits is kept."""
 
     def __init__(self, system: ErrorSystem, setup: ObservedRobot) -> None:
         self.system, self.setting, self.bodies = system, setup, placing_links(setup.decomposition)
@@ -170,7 +170,7 @@ class DistinctPoints:
         self.families: dict[tuple[int, ...], list[CriticalPoint]] = {}
 
     def add(self, points: Sequence[CriticalPoint]) -> int:
-        """How many isolated ones are new, of those that leave no loop open."""
+        """Add points; return how many new isolated ones close all loops."""
         new = 0
         if points:
             q = np.array([each.q for each in points])
@@ -199,7 +199,7 @@ class DistinctPoints:
         return new
 
     def _across(self, points: Sequence[CriticalPoint]) -> list[list[int]]:
-        """Of each point, which of the observed directions are at right angles to the desired ones."""
+        """Return for each point the observed directions at right angles to the desired ones."""
         terms = [each for each in self.system.terms if isinstance(each, DirectionTerm)]
         if not terms or not points:
             return [[] for _ in points]
@@ -208,7 +208,7 @@ class DistinctPoints:
         return (np.abs(np.stack(cosines, axis=-1)) < SAME_ENDING).astype(int).tolist()
 
     def _beyond(self, point: CriticalPoint) -> int:
-        """How many joints are beyond their limits."""
+        """Return the number of joints beyond their limits."""
         model = self.setting.all_samples.model
         try:
             return len(outside(model, of_links(model, partial(self.system.system.pose, values=point.q.tolist())).q))
@@ -226,7 +226,7 @@ class DistinctPoints:
 
     @property
     def count(self) -> int:
-        """How many are isolated."""
+        """Number of isolated points."""
         return sum(map(len, self.own.values()))
 
     @property
@@ -256,7 +256,8 @@ def anywhere(system: ErrorSystem, rng: np.random.Generator, count: int) -> Array
 
 
 def reaches(system: ErrorSystem) -> Array:
-    """How far (characteristic lengths) starts have each slide, (N,): to its limits where it has some; 0 of turns."""
+    """Return the range (characteristic lengths) of starts for each prismatic joint, (N,): to its limits if it has some;
+    0 for rotations."""
     loops = system.system
     ends = {
         stop.joint: max((abs(end) for end in (stop.lower, stop.upper) if np.isfinite(end)), default=0.0)
@@ -271,8 +272,8 @@ def reaches(system: ErrorSystem) -> Array:
 
 
 def in_mode(system: ErrorSystem, setup: ObservedRobot, q: Array) -> NDArray[np.bool_]:
-    """Which of some closed configurations (c, N), regular ones, are of the operation mode of the zero configuration,
-    with all that is to be seen in front of its camera."""
+    """Return True for those closed, regular configurations (c, N) that are of the operation mode of the zero
+    configuration, with all observed points in front of their camera."""
     drawn, kept = setup.all_samples, np.zeros(len(q), dtype=bool)
     law = Law(setup.samples.observation_model, setup.dof, 1.0)
     poses = {link: system.system.pose(link, q.T) for link in drawn.model.mechanism.links}
@@ -288,8 +289,8 @@ def in_mode(system: ErrorSystem, setup: ObservedRobot, q: Array) -> NDArray[np.b
 
 
 def along_all(system: ErrorSystem, q: Array) -> NDArray[np.bool_]:
-    """At which of critical points (c, N) E is critical along all motions that the loops leave to first order: where two
-    families of closures meet, multipliers without bound would hold any slope across these."""
+    """Return True for critical points (c, N) at which E is critical along all motions that the loops leave to first
+    order: where two families of closures meet, multipliers without bound would hold any slope across these."""
     rates = system.closures(q)[1]
     if system.supposes or not rates.shape[1]:
         return np.ones(len(q), dtype=bool)
@@ -305,8 +306,8 @@ def marks(
     points: Sequence[CriticalPoint],
     told: Sequence[Observation] | None = None,
 ) -> Array:
-    """What tells configurations (n, k) apart: the poses of the platform's bodies and the directions of all segments
-    that have one for each of these poses and what is measured (an arm's elbow that is free to move has not)."""
+    """Return values that distinguish configurations (n, k): the poses of the platform's links, the directions of all
+    segments that these poses and the measured values determine (not an arm's elbow that is free to move)."""
     if not points:
         return np.zeros((0, 0))
     loops, links = system.system, system.system.mechanism.links
@@ -328,7 +329,7 @@ def marks(
 
 
 def told_by(setup: ObservedRobot) -> tuple[Observation, ...]:
-    """What can be observed of the robot that does not move where the platform and what is observed are held."""
+    """Return observations of the robot that do not change while the platform and the measured values are fixed."""
     every, own = setup.all_samples, [o.key for o in setup.observed]
     held = setup.samples.members[0].relation.dimension
     if every.members[0].relation.dimension == held:

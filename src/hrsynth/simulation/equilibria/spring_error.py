@@ -1,16 +1,16 @@
-"""Rests of a platform that moves as it likes on three watched rods that slide, as equilibria of springs.
+"""Equilibria of a free platform on three observed sliding rods, as equilibria of springs.
 
-Rod i goes from a base point a_i to a point b_i of the platform, along u_i; c_i = u_i · u_i*. E = ½ Σ (1 − c_i²)
-pulls at b_i with f_i = c_i (u_i* − c_i u_i) / |b_i − a_i|. With t_i = c_i / |b_i − a_i| and H_i = a_i + u_i* / t_i
-this is t_i² (H_i − b_i), a spring of no length to a point of the desired line; and f_i · (b_i − a_i) = 0. Three forces
-that balance each other on a body lie in the plane m · x = d of their points b_i. So where no c_i vanishes it holds all
-H_i, and tells t_i = m · u_i* / (d − m · a_i). Springs in this plane tell the platform's place there, and its angle ψ
-but for half a turn. Three unknowns are left, two of m and d, for the three equations f_i · (b_i − a_i) = 0.
+Rod i goes from a base point a_i to a point b_i of the platform, along u_i; c_i = u_i · u_i*. E = ½ Σ (1 − c_i²) pulls
+at b_i with f_i = c_i (u_i* − c_i u_i) / |b_i − a_i|. With t_i = c_i / |b_i − a_i| and H_i = a_i + u_i* / t_i this is
+t_i² (H_i − b_i), a spring of no length to a point of the desired line; and f_i · (b_i − a_i) = 0. Three forces that
+balance each other on a body lie in the plane m · x = d of their points b_i. So where no c_i vanishes it holds all H_i,
+and t_i = m · u_i* / (d − m · a_i). Springs in this plane determine the platform's position there, and its angle ψ up to
+half a turn. Three unknowns are left, two of m and d, for the three equations f_i · (b_i − a_i) = 0.
 
 Coordinates: the components of m but that which is 1; d, or for planes far away w = 1 / d; α_i, whose tangents are t_i,
-or t_i / w; ψ. Nothing is special where a plane holds a desired line (α_i is free) or where springs do not tell ψ. Where
-a rod is short its equation vanishes by itself: f_i · (u_i* − f_i / t_i) = 0 is asked of the force that the other two
-leave, too. Far away the three equations depend on each other: Σ f_i · (R b_i − a_i) = 0 is asked as well.
+or t_i / w; ψ. Nothing is special where a plane holds a desired line (α_i is free) or where springs do not determine ψ.
+Where a rod is short its equation vanishes by itself: f_i · (u_i* − f_i / t_i) = 0 is required of the force that the
+other two leave, too. Far away the three equations depend on each other: Σ f_i · (R b_i − a_i) = 0 is required as well.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ from .pose_error import NotEnclosed, Number, PoseError
 from .subdivision import CriticalBox, Subdivision, forms_of
 
 NEAREST_FAR = 2.0
-"""How far (characteristic lengths) planes are from which on they count as far away."""
+"""Distance (characteristic lengths) from which planes count as far away."""
 PAIRS, OTHERS = ((0, 1), (0, 2), (1, 2)), ((1, 2), (0, 2), (0, 1))
 """The pairs of three rods; and those of the others, of each."""
 
@@ -83,7 +83,7 @@ class Springs:
 
     @cached_property
     def place(self) -> Components:
-        """Where the first b is, times w, so that all forces balance."""
+        """Return the position of the first b, times w, at which all forces balance."""
         parts = [
             plus(scale(pull, u), scale(self.w * own, minus(a, b)))
             for pull, own, u, a, b in zip(self.pulls, self.stiffness, self.u, self.a, self.b, strict=True)
@@ -113,11 +113,11 @@ class SpringError(JointError):
     distant: bool = field(default=False, kw_only=True)
     side: float = field(default=1.0, kw_only=True)
     flat = 1
-    """How many watched directions are at right angles to the desired ones where rests are not looked at."""
+    """Number of observed directions at right angles to the desired ones at which equilibria are not searched."""
 
     @classmethod
     def about(cls, error: PoseError) -> SpringError:
-        """Those of a pose's error; raises ``NotEnclosed`` where it is not that of three such rods."""
+        """Build the error of three such rods; raises ``NotEnclosed`` if a pose's error is another."""
         limbs = [error.limbs[each.limb] for each in error.seen if each.limb is not None]
         if (
             error.size < 6
@@ -125,15 +125,17 @@ class SpringError(JointError):
             or len(limbs) != 3
             or not all(isinstance(each, SlidingRod) and each.aside == 0 and each.axis is None for each in limbs)
         ):
-            raise NotEnclosed("the platform turns about more than one axis, and not three rods that slide are watched")
+            raise NotEnclosed(
+                "the platform rotates about more than one axis, and the observed legs are not three sliding rods"
+            )
         found = cls(error, (), error, shortest=0.0)
         if abs(np.linalg.det(found.desired)) < SAME_ENDING or found.sizes[3] < SAME_ENDING:
-            raise NotEnclosed("the watched legs do not tell the platform's plane")
+            raise NotEnclosed("the observed legs do not determine the platform's plane")
         return found
 
     @property
     def limbs(self) -> list[SlidingRod]:
-        """The watched ones."""
+        """Observed rods."""
         return [
             limb
             for each in self.error.seen
@@ -174,7 +176,7 @@ class SpringError(JointError):
 
     @property
     def charts(self) -> tuple[SpringError, ...]:
-        """Those that together hold all planes, and both sides of the platform."""
+        """Charts that together hold all planes, and both sides of the platform."""
         return tuple(
             replace(self, one=one, distant=distant, side=side)
             for one, distant, side in product(range(3), (False, True), (1.0, -1.0))
@@ -193,16 +195,16 @@ class SpringError(JointError):
 
     @property
     def size(self) -> tuple[int, int]:
-        """Coordinates, and equations that tell α and ψ."""
+        """Numbers of coordinates, and of equations that determine α and ψ."""
         return 7, 4
 
     def enclose_chart(self, middle: Array, half: Array) -> tuple[Array, Array]:
-        """Of boxes that are left open it is not told where they are."""
+        """Return unbounded boxes: the place of undecided boxes is unknown."""
         return np.full((len(middle), 6), -np.inf), np.full((len(middle), 6), np.inf)
 
     @property
     def periods(self) -> Array:
-        """Of what is told of the pose."""
+        """Periods of the pose coordinates."""
         return np.full(6, np.inf)
 
     def box(self, low: Array, high: Array, reach: float) -> tuple[Array, Array]:
@@ -225,7 +227,7 @@ class SpringError(JointError):
         return [*(minus(eye[k % 3], scale(n[k % 3] * share, both)) for k in (self.one + 1, self.one + 2)), n]
 
     def springs(self, y: Sequence[Any], number: Number) -> Springs:
-        """Those at coordinates y."""
+        """Return the springs at coordinates y."""
         x1, x2, _ = self.across(self.plane(y, number)[0], number)
         a, u = ([[dot(x, number(each)) for x in (x1, x2)] for each in some] for some in (self.bases, self.desired))
         return Springs(
@@ -257,7 +259,7 @@ class SpringError(JointError):
         ]
 
     def rest(self, y: Sequence[Any], number: Number) -> list[Any]:
-        """What is left: of each rod f · (b − a) by its length, and by its force; and Σ f · (R b − a)."""
+        """Return the other equations: of each rod f · (b − a) by its length, and by its force; and Σ f · (R b − a)."""
         at = self.springs(y, number)
         S, C, u, B = at.S, at.C, at.u, at.rods
         found = [s * _dot(each, each) - c * _dot(own, each) for s, c, own, each in zip(S, C, u, B, strict=True)]
@@ -297,7 +299,7 @@ class SpringError(JointError):
 
     @cached_property
     def left(self) -> BoxFormula:
-        """What is left beside these."""
+        """Equations beside these."""
         return of_robot(self.rest, 7)
 
     @cached_property
@@ -311,8 +313,8 @@ class SpringError(JointError):
         return of_robot(formula, 7)
 
     def in_pose(self, one: int, far: int | None) -> PlaneError:
-        """The same error over the pose, in the chart of its turn in which a component of the quaternion is 1, and of
-        its shift about the goal or of those ``far`` away."""
+        """Return the same error over the pose, in the chart of its rotation in which a component of the quaternion is
+        1, and of its shift about the goal or of the distant ones ``far``."""
         error = self.error
         return PlaneError(
             error,
@@ -329,7 +331,7 @@ class SpringError(JointError):
         )
 
     def tell_pose(self, one: int, far: int | None) -> BoxFormula:
-        """Its coordinates there."""
+        """Return its coordinates there."""
 
         def formula(y: Sequence[Any], number: Number) -> list[Any]:
             at, m = self.springs(y, number), self.plane(y, number)[0]
@@ -358,7 +360,7 @@ class SpringError(JointError):
 
     @cached_property
     def turns(self) -> BoxFormula:
-        """What ψ follows from."""
+        """Equations that determine ψ."""
         return of_robot(self.turn, 6)
 
 
@@ -371,7 +373,7 @@ def _dot(a: Components, b: Components) -> Any:
 
 
 def _about(told: BoxFormula, middle: Array, half: Array) -> tuple[Array, Array]:
-    """What a formula tells of the middle of boxes, and how far from that it can be in them."""
+    """Return a formula's values at the centre of boxes, and their largest deviations in these."""
     at, found = told.together(forms_of(middle, 0 * middle)), told.together(forms_of(middle, half))
     return at.v[0], np.maximum(found.high - at.v[0], at.v[0] - found.low)
 
@@ -403,7 +405,8 @@ class SpringSubdivision(LoopSubdivision):
         return low, high
 
     def _apart(self, low: Array, high: Array) -> Flags:
-        """Whether sides of the triangle are too long or too short: each b is on the sphere over a and H = a + τ u*."""
+        """Return True where sides of the triangle are too long or too short: each b is on the sphere over a and H = a +
+        τ u*."""
         error, found = self.error, np.zeros(len(low), dtype=bool)
         with np.errstate(all="ignore"):
             ends, through = 1 / np.tan([low[:, 3:6], high[:, 3:6]]), (low[:, 3:6] <= 0) & (high[:, 3:6] >= 0)
@@ -427,8 +430,8 @@ class SpringSubdivision(LoopSubdivision):
         return away(F, N.shape[1]), F
 
     def _report(self, x: Array, reach: Array, frame: Array) -> list[CriticalBox]:
-        """The rests at zeros that are proved; without those at which a watched direction is at right angles to the
-        desired one, or which a leg does not reach. What is not decided is left open: also where a rod may have no
+        """Return the equilibria at zeros that are proved; without those at which an observed direction is at right
+        angles to the desired one, or which a leg does not reach. Undecided ones stay open, also where a rod may have no
         length."""
         found, reach = list[CriticalBox](), self._narrow_zeros(x)
         proved = self._exist(x, reach)
@@ -446,8 +449,8 @@ class SpringSubdivision(LoopSubdivision):
         return found
 
     def _exist(self, x: Array, reach: Array) -> Flags:
-        """Whether boxes about places (c, 7) that hold all within ``reach`` hold exactly one zero, and no t is endless
-        there: of each rod one of both equations, the force's where it is short."""
+        """Return True where boxes about places (c, 7) that hold all within ``reach`` hold exactly one zero, and no t is
+        infinite there: of each rod one of both equations, the force's where it is short."""
         short = np.abs(np.cos(x[:, 3:6])) < np.abs(np.sin(x[:, 3:6]))
         rows = np.concatenate([np.broadcast_to(np.arange(4), (len(x), 4)), 4 + np.arange(3) + 3 * short], axis=1)
         proved = np.zeros(len(x), dtype=bool)
@@ -463,7 +466,8 @@ class SpringSubdivision(LoopSubdivision):
         return proved
 
     def over_pose(self, x: Array) -> Iterator[tuple[PlaneError, BoxFormula, Flags]]:
-        """The error over the pose in some charts, what tells coordinates there, and of which zeros (c, 7)."""
+        """Yield the error over the pose in some charts, the formula of the coordinates there, and the zeros (c, 7) to
+        which it applies."""
         R = np.reshape([self.error.rotation(list(each), np.asarray) for each in x], (-1, 3, 3))
         near = np.abs(quaternions(R)).argmax(axis=1)
         # where not all rods slide, no leg reaches far

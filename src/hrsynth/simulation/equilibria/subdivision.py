@@ -1,13 +1,13 @@
-"""Boxes of poses and joints that are cut until each is settled: it holds no critical point of the error, or exactly
+"""Subdivision of boxes of poses and joints until each is settled: it holds no critical point of the error, or exactly
 one.
 
 Coordinates y and equations g are those of :mod:`.joint_error`. At a critical point ∇E + μ ∇g = 0 for some μ: for any
-choice P of as many coordinates as there are equations, F = ∇E_N − ∇E_P (∇g_P)⁻¹ ∇g_N vanishes, N the other
-coordinates. A box is settled where g or F is enclosed away from zero, where a leg without a joint does not reach, or
-where Krawczyk's operator on (∇E + μ ∇g, g) proves that a box about it holds exactly one zero; where poses are asked for
-at which the error vanishes, also where that is enclosed away from zero; and where a moment is that would vanish. g = 0
-narrows the others, and tells the coordinates P in terms of N and of what each equation leaves open: of this one symbol
-each stands in all of P, so that what an equation leaves open counts once.
+choice P of as many coordinates as there are equations, F = ∇E_N − ∇E_P (∇g_P)⁻¹ ∇g_N vanishes, N the other coordinates.
+A box is settled where g or F is enclosed away from zero, where a leg without a joint does not reach, or where
+Krawczyk's operator on (∇E + μ ∇g, g) proves that a box about it holds exactly one zero; if only poses without error are
+searched, also where that is enclosed away from zero; and where a moment is that would vanish. g = 0 narrows the others,
+and gives the coordinates P in terms of N and of what each equation leaves open: of this one symbol each stands in all
+of P, so that what an equation leaves open counts once.
 """
 
 from __future__ import annotations
@@ -45,22 +45,22 @@ from .joint_bounds import narrow_joints
 from .joint_error import JointError
 
 WIDER = (1.25, 4.0)
-"""By how much boxes are larger in which exactly one zero is to be proved, one after the other."""
+"""Factors by which boxes are enlarged, one after the other, to prove exactly one zero."""
 INFLATED = 4.0
-"""How many times as large as what numbers leave open of a zero nearby such boxes are at least."""
+"""Least size of such boxes over the uncertainty of a zero nearby."""
 AROUND = 16.0 ** np.arange(4, -1, -1)
-"""How many times as large as the smallest boxes those are at least that they hold, one after the other."""
+"""Least sizes of enclosing boxes over the smallest boxes, one after the other."""
 SINGULAR = -2
 """In the place of an axis: a box is left open, ∇g may lose rank in it."""
 STRETCHED = 8.0
 """Ratio of a box's edges, as parts of those of the whole, above which the longest is cut."""
 TOLD = 2.0
-"""How many times as large slopes by joints count where it is chosen which coordinates the others tell: joints follow in
-closed form."""
+"""Factor for slopes by joints in the choice of the dependent coordinates: joints follow in closed form."""
 FOLLOWING = 0.25
-"""What part of its edge counts of a coordinate that the others tell where it is chosen which is cut."""
+"""Fraction of its edge that counts for a dependent coordinate in the choice of the edge to cut."""
 COARSE = 0.02
-"""Part of the whole box from which edges on this is so: in small boxes that are left the others may tell nothing."""
+"""Fraction of the whole box above which edges count so: in small remaining boxes the other coordinates may determine
+nothing."""
 NARROWED = 0.6
 """Part of an edge to which g = 0 narrows it below which a box is looked at again before it is cut."""
 
@@ -90,14 +90,14 @@ class Subdivision:
     vanishing: bool = False
     boxes: int = 0
     spent: bool = False
-    """Whether there were boxes left as so many had been looked at as were allowed."""
+    """Flag: boxes were left when the limit was reached."""
     left: list[tuple[Array, Array]] = field(default_factory=list)
     lost: list[tuple[Array, Array]] = field(default_factory=list)
     """Small boxes in which the equations of the legs may be dependent."""
     proved: list[tuple[Array, Array]] = field(default_factory=list)
     """Coordinates and multipliers, and the room about them, in which exactly one zero is proved."""
     flat: list[tuple[Array, Array, Array]] = field(default_factory=list)
-    """The same of zeros that are flat, the room in a frame, and this (columns)."""
+    """Zeros that are flat, the room in a frame, and this (columns)."""
 
     singular: float = SINGULAR_BOX
     """Part of the whole: boxes with edges below it in which equations may be dependent are not cut further."""
@@ -109,13 +109,14 @@ class Subdivision:
 
     @property
     def share(self) -> float:
-        """What part of the whole is left open."""
+        """Return the undecided fraction of the whole box."""
         return float(sum(np.prod(half / self.whole) for _, half in self.left))
 
     def run(self, budget: int, place: int = 0, places: int = 1, jobs: int = 1) -> None:
-        """Cut boxes until all are settled, too small, or so many were looked at; of so many ``places`` at which this is
-        done, it is told which it is at, how much space is settled, and how many boxes wait: the last per cent of space
-        may need most boxes. Many boxes are shared by so many processes (``jobs``), on whose number nothing depends."""
+        """Cut boxes until all are settled, too small, or ``budget`` boxes were processed. Progress reports have the
+        number of the search (``place`` of ``places``), the settled fraction of space, and the number of waiting boxes:
+        the last per cent of space may need most boxes. ``jobs`` processes share many boxes; no result depends on their
+        number."""
         which = "" if places == 1 else f" of search {place + 1} of {places}"
         self._run(((self.low + self.high) / 2)[None], self.whole[None], budget, jobs, f"boxes{which}")
 
@@ -132,7 +133,7 @@ class Subdivision:
 
         def say(looked: int, waiting: int, share: float) -> None:
             report(
-                f"{stage}: {np.floor(100 * (1 - share)):.0f} % of the space settled, {looked:,} looked at of at most "
+                f"{stage}: {np.floor(100 * (1 - share)):.0f} % of the space settled, {looked:,} processed of at most "
                 f"{budget:,}, {waiting:,} waiting"
             )
 
@@ -160,11 +161,11 @@ class Subdivision:
 
     @property
     def _lists(self) -> list[list[Any]]:
-        """What is found of each kind."""
+        """Results by kind."""
         return [self.left, self.lost, self.proved, self.flat]
 
     def _fill(self, half: Array) -> float:
-        """What part of the whole boxes of half edges (c, n) fill."""
+        """Return the fraction of the whole that boxes of half edges (c, n) fill."""
         return float(np.prod(half / self.whole, axis=1).sum())
 
     def _cut(
@@ -256,11 +257,11 @@ class Subdivision:
         return own[~gone], size[~gone], axis[~gone]
 
     def _narrow(self, middle: Array, half: Array) -> tuple[Array, Array]:
-        """The corners of boxes (c, n) with the joints where closed forms say that they can be."""
+        """Return the corners of boxes (c, n) with the joints narrowed by their closed forms."""
         return narrow_joints(self.error, forms_of(middle, half), middle - half, middle + half)
 
     def _settle(self, tube: list[AffineForms], P: Places, N: Places) -> tuple[Flags, AffineForms]:
-        """Whether nothing is asked for on a tube, and F there."""
+        """Return True where a tube holds no solution, and F there."""
         _, M, slope, margins = self._values(tube)
         F, minors = reduced_gradient(M, slope, P, N)
         settled = away(F, N.shape[1])
@@ -277,9 +278,9 @@ class Subdivision:
         return settled, F
 
     def _axes(self, size: Array, N: Places, F: AffineForms, loose: Flags) -> Places:
-        """Across which axes boxes are cut: that along which F changes most where only N are ``loose`` (c, n) and no
-        edge is much longer than the others; else the longest of N, or one of the other loose ones where it is longer
-        still: a surface that N tells would be cut to more and smaller pieces by all axes."""
+        """Return the axes across which boxes are cut: that along which F changes most where only N are ``loose`` (c, n)
+        and no edge is much longer than the others; else the longest of N, or one of the other loose ones where it is
+        longer still: cutting along all axes would give more and smaller pieces of a surface that N determines."""
         share, slopes = size / self.whole, np.abs(np.moveaxis(F.v[1 : 1 + N.shape[1]], 0, -1)).max(axis=1, initial=0.0)
         changes, large = np.zeros(share.shape), share.max(axis=1, keepdims=True) > COARSE
         weight = np.where(loose, np.where(large, FOLLOWING, 1.0), 0.0)
@@ -351,7 +352,7 @@ class Subdivision:
         return found
 
     def _near(self, boxes: AffineForms) -> Flags:
-        """Which of them, (c, n + k), lie in one about a flat zero."""
+        """Return True for boxes (c, n + k) that lie in one about a flat zero."""
         found = np.zeros(len(boxes.r), dtype=bool)
         for at, about, frame in self.flat:
             found |= np.all(_apart(boxes, at[None], frame[None]) <= about, axis=1)
@@ -466,7 +467,7 @@ class Subdivision:
         return at, room, frame
 
     def _report(self, x: Array, reach: Array, frame: Array) -> list[CriticalBox]:
-        """What boxes in frames with one zero each hold."""
+        """Return the critical points of boxes in frames with one zero each."""
         (n, k), error, far, forms = self.error.size, self.error.error, self.error.far, forms_of(x, reach, frame)
         K, forms, radius = self._equations(x, forms)[1], forms[:n], hull(reach, frame)
         if far is not None:
@@ -496,7 +497,8 @@ class Subdivision:
 def _cut_part(
     given: bytes, middle: Array, half: Array, budget: int
 ) -> tuple[int, list[list[Any]], tuple[Array, Array]]:
-    """How many boxes were cut, what was found of each kind, and the boxes that wait when so many were looked at."""
+    """Cut a part of the boxes; return the number of boxes cut, the results by kind, and the boxes that wait when the
+    budget is used up."""
     part = replace(_read(given), left=[], lost=[], proved=[], flat=[])
     waiting = part._cut(middle, half, budget, lambda *_: None)
     return part.boxes, part._lists, waiting
@@ -518,12 +520,12 @@ def forms_of(middle: Array, half: Array, frame: Array | None = None) -> list[Aff
 
 
 def hull(half: Array, frame: Array) -> Array:
-    """How far boxes (c, n) in frames reach in the coordinates themselves."""
+    """Return the half edges, in the coordinates themselves, of boxes (c, n) in frames."""
     return np.asarray((np.abs(frame) @ half[..., None])[..., 0] * (1 + BOX_ROUNDING))
 
 
 def _apart(boxes: AffineForms, at: Array, frame: Array) -> Array:
-    """How far boxes reach from places (c, n), in frames."""
+    """Return the distance of boxes from places (c, n), in frames."""
     apart, back = AffineForms(boxes.v.copy(), boxes.r), inverse(frame)
     apart.v[0] -= at
     with np.errstate(all="ignore"):
@@ -537,8 +539,8 @@ def _apart(boxes: AffineForms, at: Array, frame: Array) -> Array:
 
 
 def _narrow_symbols(g: AffineForms, P: Places | None = None) -> tuple[Array, Array]:
-    """Where in [−1, 1] the symbols (c, n) are, as far as equations g (c, k) = 0 tell; those ``P`` alone of one equation
-    each, which it has the coefficient 1 in."""
+    """Return the ranges in [−1, 1] of the symbols (c, n) that equations g (c, k) = 0 allow; those ``P`` alone of one
+    equation each, in which it has the coefficient 1."""
     J = np.moveaxis(g.v[1:], 0, -1)
     size = np.abs(J)
     if P is not None:

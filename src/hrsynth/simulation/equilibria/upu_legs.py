@@ -1,12 +1,12 @@
-"""Legs of a U joint, a slide and a U joint (struts): where their joints lock, and at which turns a platform on them
-translates.
+"""Legs of a U joint, a slide and a U joint (struts): where their joints lock, and the rotations at which a platform on
+them translates.
 
 Outer axes a (in the base) and a′ (in the platform) are parallel where the platform translates, inner ones b are
-parallel, at right angles to a and to the rod. So the rod has the direction that its tip asks for, but where that is
-a's: there b may have any direction at right angles to a, and no joint moves the tip along b. With the turn q about a
-and the rod at the angle ε to it, E = E₀(s) + ε w · n(q) + O(ε²), n(q) at right angles to a. Such a place is a rest
-where E₀ is critical along the line of tips s a, and w · n(q) = 0. The Hessian by ε and q has the determinant −|w|²,
-so none of them attracts. Where two lines meet E is critical along curves: both rods turn about theirs.
+parallel, at right angles to a and to the rod. So the rod has the direction of its tip, except along a: there b may have
+any direction at right angles to a, and no joint moves the tip along b. With the turn q about a and the rod at the angle
+ε to it, E = E₀(s) + ε w · n(q) + O(ε²), n(q) at right angles to a. Such a place is an equilibrium where E₀ is critical
+along the line of tips s a, and w · n(q) = 0. The Hessian by ε and q has the determinant −|w|², so none of them is
+stable. Where two lines meet E is critical along curves: both rods turn about theirs.
 """
 
 from __future__ import annotations
@@ -136,7 +136,7 @@ def meetings(every: Sequence[Line]) -> list[Array]:
 
 
 def coincide(every: Sequence[Line]) -> bool:
-    """Whether some two lines are one: two legs lock all along it, which fills more than points."""
+    """Return True if two lines are one: two legs lock all along it, not only at points."""
     return any(
         lines.parallel(a, b) and lines.distance(p, q, b) <= FOLLOWED for (p, a), (q, b) in combinations(every, 2)
     )
