@@ -31,7 +31,9 @@ print(row("robot", "real", "hidden", "verdict", "rank", "modes (real of complex)
 for name, found in derived.items():
     listed = found.modes()
     numbers[name] = (len(listed.modes), listed.found.complex)
-    count = "a continuous family" if listed.found.continuous_family else f"{len(listed.modes)} of {listed.found.complex}"
+    count = (
+        "a continuous family" if listed.found.continuous_family else f"{len(listed.modes)} of {listed.found.complex}"
+    )
     print(
         row(
             name,

@@ -19,7 +19,9 @@ plt.style.use("hrsynth.present.style")
 robot = hrsynth.load("gough_stewart")
 sets = hrsynth.legs(robot)
 for size in range(1, 7):
-    verdicts = Counter(f"{each.verdict} (rank {each.rank} of {each.dof})" for each in sets.sets if len(each.legs) == size)
+    verdicts = Counter(
+        f"{each.verdict} (rank {each.rank} of {each.dof})" for each in sets.sets if len(each.legs) == size
+    )
     print(size, "legs observed:", dict(verdicts))
 assert all((each.verdict == "controllable") == (len(each.legs) >= 3) for each in sets.sets)
 

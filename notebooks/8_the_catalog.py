@@ -128,8 +128,8 @@ assert {"RRPR", "RPRR"} <= {*always}
 assert 2 * verdicts["RPPR"]["controllable"] == verdicts["RPPR"].total()
 
 # %% [markdown]
-# For planar robots the rank is given by a theorem, with its proof on the page *What decides whether a leg helps*. While
-# an observed direction is fixed, the instantaneous centre of the platform stays on a line. The rank of the legs is the
+# For planar robots the rank is given by a theorem, with its proof on the page *What the catalog shows*. While an
+# observed direction is fixed, the instantaneous centre of the platform stays on a line. The rank of the legs is the
 # rank of their lines. Here is a test on a 3-RRR with random joints; the observed link follows the second R:
 
 # %%
@@ -185,7 +185,7 @@ for record in catalog.where(group="pods", motion="3T"):
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 2. the notation does not decide: 3-P*RR is in all three lists. What decides is the observed link (!) and whether the
-#    the legs are parallel (Px, not Ph) do. In notebook 3 the slides are not parallel and the last link is watched.
+#    rails are parallel (Px, not Ph). In notebook 3 the rails are not parallel and the last link is observed.
 planar = [record for record in catalog.where(group="planar", dof=3, legs=3) if "+" not in record["word"]]
 for verdict in ("controllable", "partially controllable", "uncontrollable"):
     listed = sorted({record["notation"] for record in planar if record["verdict"] == verdict})
