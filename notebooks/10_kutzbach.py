@@ -22,10 +22,12 @@ plt.style.use("hrsynth.present.style")
 # %% [markdown]
 # ## Bennett, 1903
 #
+#
 # Four links in a ring, four revolute joints, no two axes parallel or meeting. In space a link that is not the base has
-# six dof, and a revolute joint removes five of them: 6 · 3 − 5 · 4 = −2. G. T. Bennett found that it moves all the same
-# if opposite links are equal and sin α / a = sin β / b. Here a and b are the lengths of the links (distances between
-# neighbouring axes), and α and β their twists (angles between these axes).
+# six dof, and a revolute joint removes five of them: 6 · 3 − 5 · 4 = −2.
+#
+# G. T. Bennett found that it moves all the same if opposite links are equal and sin α / a = sin β / b. Here a and b are
+# the lengths of the links (distances between neighbouring axes), and α and β their twists (angles between these axes).
 
 # %%
 linkage = bennett()
@@ -37,8 +39,8 @@ checked
 
 # %% [markdown]
 # *Mobility 1*. The last line explains it: three constraints of the loop are redundant, and −2 + 3 = 1. They are counted
-# by the rank of the loop Jacobian, with its rank gap, at twenty configurations, so this does not hold at one pose only.
-# The loop is named after its loop closure, the joint at which it is cut.
+# by the rank of the loop Jacobian, with its rank gap. The rank is the same at twenty configurations. The loop is named
+# after its loop closure, the joint at which it is cut.
 #
 # The formulas of Denavit and Hartenberg are independent of the program. By them the ring closes for every angle of one
 # joint, and tan θ₁/2 · tan θ₂/2 is constant:
@@ -142,12 +144,15 @@ axes.legend()
 plt.show()
 
 # %% [markdown]
+#
 # A robot with that geometry has a self-motion only in this orientation of its platform. Worse are robots with a
-# self-motion at *every* pose (*architecturally singular*, O. Ma and J. Angeles, 1992). A Gough-Stewart platform with
-# plane and similar base and platform is one if its six joints lie on a conic. Let (x, y) be a base point and t + s R
-# (x, y, 0) the platform's. Each Plücker coordinate of the leg's line is then a linear combination of 1, x, y, x², xy,
-# y², with the same coefficients for all legs. On a conic these six are dependent, hence the six lines as well. Similar
-# hexagons with corners anywhere are not enough. The smallest singular value of the six lines, over random poses:
+# self-motion at *every* pose (*architecturally singular*, O. Ma and J. Angeles, 1992).
+#
+# A Gough-Stewart platform with plane and similar base and platform is one if its six joints lie on a conic. Let (x, y)
+# be a base point and t + s R (x, y, 0) the platform's. Each Plücker coordinate of the leg's line is then a linear
+# combination of 1, x, y, x², xy, y², with the same coefficients for all legs. On a conic these six are dependent, hence
+# the six lines as well. Similar hexagons with corners anywhere are not enough. The smallest singular value of the six
+# lines, over random poses:
 
 # %%
 rng = np.random.default_rng(1)

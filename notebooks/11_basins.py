@@ -84,8 +84,8 @@ for legs in (None, ["2", "3"]):
 # ## Exercises
 #
 # 1. To which pose do the other runs of the four legs converge, and by how many degrees is each direction wrong there?
-# 2. How many times larger than the region of the proved attraction radius is the goal's basin of the planar robot, as
-#    far as it is drawn?
+# 2. By which factor is the planar robot's basin of the goal (as far as drawn) larger than the region of the proved
+#    attraction radius?
 # 3. For how many of the planar robot's starts can noise decide the outcome?
 
 # %% [markdown]

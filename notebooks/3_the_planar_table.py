@@ -74,11 +74,14 @@ assert derived["3prp"].verdict.rank == derived["3rrp"].verdict.rank == 1
 assert derived["3ppr_m1"].verdict.rank == derived["3ppr_m2"].verdict.rank == 0
 
 # %% [markdown]
+#
 # **The assembly modes.** With fixed directions, the locus of each leg's tip is a curve. It is a line if the leg ends
 # with a prismatic joint, and a circle if the rod is on a crank. The platform is a triangle whose corners must lie on
-# three such curves. For three lines there are 2 solutions. For three circles there are 6, complex ones included. That
-# is the classical problem of a triangle on two cranks: its third corner traces a *coupler curve*, and the third circle
-# cuts it in up to six points (MMT Fig. 7).
+# three such curves.
+#
+# For three lines there are 2 solutions. For three circles there are 6, complex ones included. That is the classical
+# problem of a triangle on two cranks: its third corner traces a *coupler curve*, and the third circle cuts it in up to
+# six points (MMT Fig. 7).
 #
 # Can all six be real? With the shipped dimensions only two are, but there are others with all six:
 

@@ -18,11 +18,13 @@ START, GOAL = "x=0,y=0,z=-0.75,phi=0", "x=-0.2,y=0,z=-0.56,phi=0"
 print(hrsynth.legs(robot))
 
 # %% [markdown]
+#
 # Two directions are four numbers, and the platform has four dof. Yet not every pair is enough. Legs 1 and 2 are
 # attached to one half of the platform, 3 and 4 to the other. Observing both legs of one half does not show how the
-# other half rotates about its revolute joint. One leg on each half is needed, which leaves four pairs. (The paper
-# counts six, in MMT 5.1.2 and A.2. Pairs on one half have a hidden robot of the same notation, 2-Π-{2-U̲U}, but the
-# other half of the platform is not controlled.)
+# other half rotates about its revolute joint. One leg on each half is needed, which leaves four pairs.
+#
+# (The paper counts six, in MMT 5.1.2 and A.2. Pairs on one half have a hidden robot of the same notation, 2-Π-{2-U̲U},
+# but the other half of the platform is not controlled.)
 
 # %%
 for pair in (["1", "2"], ["1", "4"]):
@@ -49,8 +51,10 @@ hrsynth.draw(hidden)
 #
 # ## Assembly modes
 #
+#
 # With its direction fixed, the tip of a leg moves on a circle, that of its parallelogram. The platform has its own
 # circle: as its halves rotate on each other, the second revolute joint moves on a horizontal circle about the first.
+#
 # Translated along the circle of one leg, that circle sweeps a surface that MMT 4.2.2 calls a Bohemian dome. It is of
 # degree four, so the circle of the other leg meets it in at most eight points: the modes. The goal of the paper's first
 # simulation (MMT 5.1.3), for two of the pairs:
@@ -91,11 +95,14 @@ assert [run.outcome == "goal" for run in runs.values()] == [False, True]
 hrsynth.draw(runs["14"])
 
 # %% [markdown]
+#
 # With legs 1 and 4 the directions reach their desired values but the robot does not reach the goal: it stops at another
 # assembly mode. The same happens in the paper (MMT Figs. 22 and 23). MMT 3.3 explains it by aspects: start and goal
-# must lie in one. For legs 2 and 3 that is proved, by a straight path. For legs 1 and 4 a path without Type 2
-# singularity exists too. But at its end both legs are in their other working modes, where their directions are not the
-# desired ones. So the controller cannot use it, and it does not prove that there is no other:
+# must lie in one.
+#
+# For legs 2 and 3 that is proved, by a straight path. For legs 1 and 4 a path without Type 2 singularity exists too.
+# But at its end both legs are in their other working modes, where their directions are not the desired ones. So the
+# controller cannot use it, and it does not prove that there is no other:
 
 # %%
 for legs in ("14", "23"):

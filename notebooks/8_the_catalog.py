@@ -36,9 +36,9 @@ for name in ("word", "notation", "motion", "hidden", "verdict", "exact", "fewest
     print(f"{name:12}{delta.get(name)}")
 
 # %% [markdown]
-# `Rt` is a revolute joint with a tangential axis at the leg's base point, `2SSt` two parallel rods with their spherical
-# joints side by side along the same direction. The verdict does not belong to one geometry. *Exact* means that ranks
-# were computed in integers, at a rational instance: a random geometry with the incidences of the key. If the verdict is
+# `Rt` is a revolute joint with a tangential axis at the leg's base, and `2SSt` two parallel rods with their spherical
+# joints side by side along that direction. The verdict does not belong to one geometry. *Exact* means that ranks were
+# computed in integers, at a rational instance: a random geometry with the incidences of the key. If the verdict is
 # *controllable*, that proves it for almost all geometries of the architecture.
 #
 # ## The query

@@ -56,11 +56,14 @@ assert aspects.cuspidal
 assert aspects.aspects_met == "2"
 
 # %% [markdown]
+#
 # Six modes, two aspects, three modes in each. *Separated* is proved by the sign of a determinant, which cannot change
 # without a zero. *Same aspect* is proved by a path: it is cut into intervals, and interval arithmetic shows on each of
-# them that the determinant is not zero. On some paths a leg is stretched and changes its working mode. That is a
-# singularity of Type 1: all platform dof are still observed, but the directions change infinitely fast. One path has no
-# such singularity, and it is a straight line:
+# them that the determinant is not zero.
+#
+# On some paths a leg is stretched and changes its working mode. That is a singularity of Type 1: all platform dof are
+# still observed, but the directions change infinitely fast. One path has no such singularity, and it is a straight
+# line:
 
 # %%
 one, other = next(pair.numbers for pair in aspects.changes if pair.answer is not None and not pair.answer.crossings)
@@ -82,9 +85,9 @@ hrsynth.draw(run)
 
 # %% [markdown]
 # It converges to the other mode. The directions are those of the start, and the platform is 13 cm and 108 degrees from
-# its start. The rank stayed full, no matrix was singular, no error was large. (The path bends a little at first. The
-# desired directions are interpolated between poses of the line, which matters while the singular value is small.) Along
-# the path the smallest singular value falls to a ninth of its value at the start, and rises again. It is never zero:
+# its start. The rank stayed full, no matrix was singular, no error was large. (The path bends a little at first: the
+# desired directions are interpolated between poses of the line.) Along the path the smallest singular value falls to a
+# ninth of its value at the start, and rises again. It is never zero:
 
 # %%
 starts = np.linspace(0, 1, 60)
