@@ -17,7 +17,7 @@ LOCK = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generat
 	--no-annotate --custom-compile-command "make lock" $(LOCKFLAGS) pyproject.toml --group build
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all test-long golden fuzz adversary bounds endings files parroblib bench lint types index robots readme catalog notebooks jupyter docs pictures lock three release setup setup-dev setup-all setup-browser clean
+.PHONY: help demo test test-all test-long golden fuzz adversary bounds equilibria files parroblib bench lint types index robots readme catalog notebooks jupyter docs pictures lock three release setup setup-dev setup-all setup-browser clean
 .DELETE_ON_ERROR:
 
 help:  ## this list
@@ -80,9 +80,9 @@ jupyter: setup-all  ## open the notebooks in Jupyter, which is fetched the first
 docs: setup-all  ## run the notebooks that changed and build the site in build/site
 	@NO_MKDOCS_2_WARNING=1 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/mkdocs build --quiet --strict
 
-endings: setup-dev  ## how 100 far servo runs of every robot end, checked, against the lists, as tables in studies/endings (an hour; a broken-off run goes on)
+equilibria: setup-dev  ## outcomes of 100 servo runs of each robot, checked against the lists, as tables in studies/equilibria (an hour; an interrupted run continues)
 	@mkdir -p build && cd tests && OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 ../$(BIN)/python -m simulation.far 100 --random 57 \
-		--log ../build/far.jsonl -o ../studies/endings/README.md
+		--log ../build/far.jsonl -o ../studies/equilibria/README.md
 
 files: setup-dev  ## read robot files of others again (OTHERS=folder with clones of their repositories: studies/files)
 	@HRSYNTH_OTHERS="$(abspath $(OTHERS))" $(PYTEST) tests/description/foreign/test_others.py

@@ -54,7 +54,7 @@ def published(catalog: Catalog) -> str:
             *VERDICTS,
             "refused",
             "not exact",
-            "legs to watch: controllable robots",
+            "legs to observe: controllable robots",
             "with a list of modes",
         ),
         rows,
