@@ -102,8 +102,8 @@ assert np.abs(u @ M).max() < 1e-12 < np.abs(u @ printed).max()
 # the distance of the axis. MMT (3), (4) give the normals of the two planes, and both planes contain the direction (MMT
 # (5)):
 #
-# $$ n_{1,2} = \mp \cos\theta\, \mathbf{h} - \sin\theta\, u \times \mathbf{h}, \quad \sin\theta = R/h, \quad u = \pm\, n_1 \times n_2 /
-# \|n_1 \times n_2\| $$
+# $$ n_{1,2} = \mp \cos\theta\, \mathbf{h} - \sin\theta\, u \times \mathbf{h}, \quad \sin\theta = R/h, \quad u = \pm\,
+# n_1 \times n_2 / \|n_1 \times n_2\| $$
 
 
 # %%
@@ -221,7 +221,7 @@ for product in (0.2, 1.0, 1.8, 2.1):
     distances[product] = 1e3 * np.linalg.norm(loop(near, taught, gain=product / 0.04, time=1.0) - GOAL, axis=1)
     axes.semilogy(distances[product], label=f"λh = {product}")
 axes.set(xlabel="step", ylabel="distance to the goal (mm)")
-axes.legend(loc="center left", bbox_to_A=(1.0, 0.5))
+axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
 plt.show()
 assert distances[1.0][-1] < distances[1.8][-1] < distances[1.8][0] < distances[2.1][-1]
 

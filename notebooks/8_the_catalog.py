@@ -32,7 +32,7 @@ for (group, verdict), count in catalog.count("group", "verdict").items():
 # %%
 print(drawing(parse("3(Rt*-2SSt)")))
 delta = catalog["3(Rt*-2SSt)"]
-for name in ("word", "notation", "motion", "hidden", "verdict", "exact", "fewest", "minimal", "condition"):
+for name in ("key", "notation", "motion", "hidden", "verdict", "exact", "fewest", "minimal", "condition"):
     print(f"{name:12}{delta.get(name)}")
 
 # %% [markdown]
@@ -55,11 +55,11 @@ print(len(fitting), "architectures,", len(driven), "of them with all three dof a
 # There are so many because the catalog combines different legs in one robot. Most published robots have equal legs:
 
 # %%
-equal = [record for record in driven if "+" not in record["word"] and "|" not in record["word"]]
+equal = [record for record in driven if "+" not in record["key"] and "|" not in record["key"]]
 print(f"{'key':36}{'notation':18}{'hidden robot':34}{'legs':6}needed")
 for record in equal:
     sets = "  ".join("{" + ", ".join(each) + "}" for each in record["minimal"])
-    print(f"{record['word']:36}{record['notation']:18}{record['hidden']:34}{record['legs']:<6}{sets}")
+    print(f"{record['key']:36}{record['notation']:18}{record['hidden']:34}{record['legs']:<6}{sets}")
 
 # %% [markdown]
 # ## How common is it?
@@ -88,7 +88,7 @@ assert counts["controllable", 3] > counts["controllable", 2]
 
 # %%
 for record in [each for each in translational if each["verdict"] != "controllable"][:8]:
-    print(f"{record['word']:42}unobserved: {'; '.join(record['lost'])}; suggestion: {record.get('cure')}")
+    print(f"{record['key']:42}unobserved: {'; '.join(record['unobserved'])}; suggestion: {record.get('suggestion')}")
 
 # %% [markdown]
 # ## What all verdicts have in common
@@ -98,7 +98,7 @@ for record in [each for each in translational if each["verdict"] != "controllabl
 # %%
 verdicts = {}
 for record in catalog.where(group="spatial"):
-    chain = {"".join(joint.letter for joint in leg.joints) for leg in parse(record["word"]).legs}
+    chain = {"".join(joint.letter for joint in leg.joints) for leg in parse(record["key"]).legs}
     if len(chain) == 1 and record.get("verdict"):
         verdicts.setdefault(chain.pop(), Counter())[record["verdict"]] += 1
 names = sorted(verdicts, key=lambda name: verdicts[name]["controllable"] / verdicts[name].total())
@@ -180,13 +180,13 @@ print(shipped.smallest, " / ", delta["minimal"])
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 1. equal legs: no sum of legs in the key
 for record in catalog.where(group="pods", motion="3T"):
-    if "+" not in record["word"]:
-        print(f"{record['word']:28}{record['notation']:14}{record['verdict']:24}{record['fewest']} legs")
+    if "+" not in record["key"]:
+        print(f"{record['key']:28}{record['notation']:14}{record['verdict']:24}{record['fewest']} legs")
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 2. the notation does not decide: 3-P*RR is in all three lists. What decides is the observed link (!) and whether the
 #    rails are parallel (Px, not Ph). In notebook 3 the rails are not parallel and the last link is observed.
-planar = [record for record in catalog.where(group="planar", dof=3, legs=3) if "+" not in record["word"]]
+planar = [record for record in catalog.where(group="planar", dof=3, legs=3) if "+" not in record["key"]]
 for verdict in ("controllable", "partially controllable", "uncontrollable"):
     listed = sorted({record["notation"] for record in planar if record["verdict"] == verdict})
     print(f"{verdict:24}", *listed)
@@ -194,7 +194,7 @@ for verdict in ("controllable", "partially controllable", "uncontrollable"):
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 3. the catalog keeps one of the smallest sets, advise lists all of them
-record = next(each for each in translational if each["verdict"] != "controllable" and each.get("cure"))
-advice = hrsynth.advise(mechanism(parse(record["word"]), record.get("attempt", 0)))
-print(record["word"], "– catalog:", record["cure"])
+record = next(each for each in translational if each["verdict"] != "controllable" and each.get("suggestion"))
+advice = hrsynth.advise(mechanism(parse(record["key"]), record.get("attempt", 0)))
+print(record["key"], "– catalog:", record["suggestion"])
 print(advice)
