@@ -51,7 +51,7 @@ def centres(leg: LegKey, end: int = 0) -> str | None:
 
 
 def planar_rank(word: ArchitectureKey) -> int:
-    """Return the rank of the legs of a planar robot: that of their lines of centres; of a point, that of its directions.
+    """Return the rank of the legs of a planar robot: of their lines of centres; of a point: of its free directions.
     Parallel rails are all along x."""
     point = word.platform == "point"
     found = Counter(centres(leg, 1 if point else 0) for leg in word.legs)
