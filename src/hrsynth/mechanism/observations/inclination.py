@@ -19,7 +19,7 @@ class Inclination(SeenAxis):
     """The unit vector R_ℓᵀ R_0 d: ``seen_from`` is the link ℓ with the IMU, ``link`` the base, d its vertical."""
 
     kind = "inclination"
-    words = "the direction of the base's vertical in a link: an IMU at rest on it"
+    words = "the direction of the base's vertical in a link: a stationary IMU on it"
     needs = ("axis?",)
 
     @property
