@@ -17,7 +17,7 @@ from dataclasses import replace
 
 import by_hand
 import numpy as np
-from measure import Row, Run, compiled, least, plane, same, threads, compare
+from measure import Row, Run, compare, compiled, least, plane, same, threads
 
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.batch.engine import Batch
