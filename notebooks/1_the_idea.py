@@ -155,7 +155,7 @@ assert reaching.outcome == "goal"
 # %%
 run = hrsynth.servo(robot, start="x=0,y=0.345", goal=goal)
 metres, _ = run.from_goal
-print(f"outcome: {run.outcome}, assembly mode {run.run_outcome.matched}, {1e3 * metres:.0f} mm from the goal")
+print(f"outcome: {run.outcome} {run.run_outcome.matched}, {1e3 * metres:.0f} mm from the goal")
 assert "mode" in run.outcome
 assert metres > 0.3
 hrsynth.draw(run)

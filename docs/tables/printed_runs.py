@@ -7,16 +7,16 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Replay:
-    """A printed run: source, observed legs, start and goal, printed outcome and figures, and a remark on the computed
-    ones; λ (1/s) and the noise. Runs of one ``order`` are ranked by their errors as printed in ``place`` (1: the best;
-    equal places: about the same)."""
+    """A printed run: source, observed legs, start and goal, printed outcome and figures (``said``), and a remark on the
+    computed ones; λ (1/s) and the noise. Runs of one ``order`` are ranked by their errors as printed in ``place`` (1:
+    the best; equal places: about the same)."""
 
     source: str
     robot: str
     legs: tuple[str, ...]
     way: tuple[str, str]
     ended: str
-    printed_figures: str
+    said: str
     remark: str = ""
     gain: float = 0.8
     noise: str | None = None
@@ -76,26 +76,18 @@ SIMULATED = (
         ("1", "4"),
         _HIGH,
         ended="mode",
-        printed_figures="(−0.2, 0, −0.909)",
+        said="(−0.2, 0, −0.909)",
         remark="the same mode, 7 mm from the printed digits",
     ),
-    Replay("MMT 5.1.3, Fig. 22", "quattro", ("2", "3"), _HIGH, ended="goal", printed_figures="(−0.2, 0, −0.56)"),
-    Replay(
-        "MMT 5.1.3, Fig. 25",
-        "quattro",
-        _ALL,
-        _LOW,
-        ended="mode",
-        printed_figures="(0.03, 0.03, −0.65)",
-        remark=_NEAR_MODE,
-    ),
+    Replay("MMT 5.1.3, Fig. 22", "quattro", ("2", "3"), _HIGH, ended="goal", said="(−0.2, 0, −0.56)"),
+    Replay("MMT 5.1.3, Fig. 25", "quattro", _ALL, _LOW, ended="mode", said="(0.03, 0.03, −0.65)", remark=_NEAR_MODE),
     Replay(
         "MMT 5.1.3, Fig. 26",
         "quattro",
         _ALL,
         ("x=0.028,y=0,z=-0.617,phi=0", "x=-0.6,y=0,z=-0.8,phi=0"),
         ended="local minimum",
-        printed_figures="(−0.588, 0, −0.847)",
+        said="(−0.588, 0, −0.847)",
         remark="the printed pose is not on the boundary, and the run does not stop",
     ),
     Replay(
@@ -105,12 +97,10 @@ SIMULATED = (
         _RIGID,
         gain=5,
         ended="mode",
-        printed_figures="(0, −0.25, −0.958)",
+        said="(0, −0.25, −0.958)",
         remark="the printed mode is out of a rod's reach; these dimensions give one 2 mm from the goal",
     ),
-    Replay(
-        "IROS V, Fig. 5", "quattro_rigid", ("1", "3"), _RIGID, gain=5, ended="goal", printed_figures="(0, −0.25, −0.7)"
-    ),
+    Replay("IROS V, Fig. 5", "quattro_rigid", ("1", "3"), _RIGID, gain=5, ended="goal", said="(0, −0.25, −0.7)"),
 )
 NOISY = (
     Replay(
@@ -120,7 +110,7 @@ NOISY = (
         _ACROSS,
         noise="0.1deg",
         ended="goal",
-        printed_figures="3 mm, 0.05 rad",
+        said="3 mm, 0.05 rad",
         remark=_PERSISTS,
         order="Fig. 28",
         place=1,
@@ -133,7 +123,7 @@ NOISY = (
         _ACROSS,
         noise="0.1deg",
         ended="goal",
-        printed_figures="7 mm, 0.07 rad",
+        said="7 mm, 0.07 rad",
         remark=_PERSISTS,
         order="Fig. 28",
         place=2,
@@ -146,7 +136,7 @@ NOISY = (
         _DOWN,
         noise="0.1deg",
         ended="goal",
-        printed_figures="as {1, 3, 4}",
+        said="as {1, 3, 4}",
         order="Fig. 29",
         place=2,
     ),
@@ -157,7 +147,7 @@ NOISY = (
         _DOWN,
         noise="0.1deg",
         ended="goal",
-        printed_figures="as {1, 4}",
+        said="as {1, 4}",
         order="Fig. 29",
         place=2,
     ),
@@ -168,7 +158,7 @@ NOISY = (
         _DOWN,
         noise="0.1deg",
         ended="goal",
-        printed_figures="best",
+        said="best",
         order="Fig. 29",
         place=1,
     ),
@@ -180,7 +170,7 @@ NOISY = (
         gain=5,
         noise="0.01deg",
         ended="goal",
-        printed_figures="1.6 mm",
+        said="1.6 mm",
         remark="2.7 times what errors of 0.01° can make at this pose, to first order",
         order="Fig. 7a",
         place=3,
@@ -194,7 +184,7 @@ NOISY = (
         gain=5,
         noise="0.01deg",
         ended="goal",
-        printed_figures="0.22 mm",
+        said="0.22 mm",
         remark=_PERSISTS,
         order="Fig. 7a",
         place=2,
@@ -208,21 +198,14 @@ NOISY = (
         gain=5,
         noise="0.01deg",
         ended="goal",
-        printed_figures="0.15 mm",
+        said="0.15 mm",
         remark=_PERSISTS,
         order="Fig. 7a",
         place=1,
         printed=(0.00015, None),
     ),
     Replay(
-        "IROS V, Fig. 7b",
-        "quattro_rigid",
-        ("1", "3"),
-        _RIGID_2,
-        gain=5,
-        noise="0.1deg",
-        ended="goal",
-        printed_figures="converges",
+        "IROS V, Fig. 7b", "quattro_rigid", ("1", "3"), _RIGID_2, gain=5, noise="0.1deg", ended="goal", said="converges"
     ),
 )
 MEASURED = (

@@ -79,7 +79,7 @@ def row(replay: Replay) -> tuple[str, ...]:
         f"`{replay.robot}`",
         ", ".join(replay.legs),
         noise,
-        f"{replay.ended} {replay.printed_figures}",
+        f"{replay.ended} {replay.said}",
         here,
         same,
         _figures(replay, found),
@@ -91,7 +91,7 @@ def row(replay: Replay) -> tuple[str, ...]:
 def _figures(replay: Replay, found: Servo) -> str:
     """Compare printed and computed figures: distance of two positions, or ratios of errors and their order."""
     if found.spread is None:
-        printed = [float(v) for v in replay.printed_figures.strip("()").replace("−", "-").split(",")]
+        printed = [float(v) for v in replay.said.strip("()").replace("−", "-").split(",")]
         distance = math.dist(printed, [v or 0.0 for v in (found.pose.x, found.pose.y, found.pose.z)])
         return f"{1e3 * distance:.0f} mm"
     ratios = [
