@@ -94,7 +94,7 @@ parroblib: setup-dev  ## compare published tables of robots with what is compute
 bench: setup-all  ## run the benchmarks and write their table in benchmarks/ (some minutes)
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python benchmarks/table.py benchmarks/README.md
 
-pictures: setup-all setup-browser  ## draw the pictures in docs/pictures again (ten minutes)
+pictures: setup-all setup-browser  ## draw the figures in docs/pictures (some minutes)
 	@$(BIN)/python docs/pictures.py
 
 lock: setup-dev  ## resolve the dependencies again (LOCKFLAGS=--upgrade: to the newest versions)
