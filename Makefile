@@ -40,13 +40,13 @@ test-long: setup-all  ## the tests that are left: all members of each law, many 
 fuzz: setup-dev  ## 100,000 mutations of robot files (MUTATIONS=, SEED=): each is read or refused
 	@$(BIN)/python tests/description/foreign/fuzz.py --count $(MUTATIONS) --seed $(SEED)
 
-golden: setup-all  ## what every command answers, held against the golden files (ONLY=TEXT: cases that hold it; an hour)
+golden: setup-all  ## compare the output of every command with the golden files (ONLY=TEXT: cases that contain it; an hour)
 	@cd tests && OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 ../$(BIN)/python -m golden.run compare --only "$(ONLY)" --workers $(JOBS)
 
 bounds: setup-dev  ## 10,000 random instances of every family of assembly modes (INSTANCES=10000; half an hour)
 	@cd tests && OMP_NUM_THREADS=1 ../$(BIN)/python -m analysis.modes.bounds $(INSTANCES)
 
-adversary: setup-dev  ## brute force against the answers for random robots (COUNT=300, SEED=0); a broken-off run goes on
+adversary: setup-dev  ## compare results for random robots with brute force (COUNT=300, SEED=0); an interrupted run continues
 	@mkdir -p build && cd tests && OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 ../$(BIN)/python -m adversary.run \
 		--count $(COUNT) --seed $(SEED) --workers $(JOBS) --log ../build/adversary.jsonl
 
@@ -57,7 +57,7 @@ types: setup-dev  ## type check
 	@$(BIN)/mypy
 	@$(BIN)/mypy --config-file tests/mypy.ini
 
-index: setup  ## what `import hrsynth` and the command line know of all analyses, from their declarations
+index: setup  ## register all analyses for `import hrsynth` and the command line, from their declarations
 	@$(BIN)/python -c "from hrsynth.index import write; write()"
 
 robots: setup  ## regenerate robots/*.urdf from the families
@@ -67,7 +67,7 @@ readme: setup  ## regenerate the tables of robots/README.md, docs/pages and stud
 	@cd docs && ../$(BIN)/python -m tables
 	@cd studies && PYTHONPATH=../docs ../$(BIN)/python -m parroblib.says
 
-catalog: setup-all  ## build catalog/, or go on where that was broken off (JOBS= processes; hours)
+catalog: setup-all  ## build catalog/, or continue an interrupted build (JOBS= processes; hours)
 	@$(BIN)/hrsynth catalog build --workers $(JOBS)
 
 notebooks: setup-all  ## write notebooks/*.ipynb from their scripts, without outputs
@@ -87,7 +87,7 @@ equilibria: setup-dev  ## outcomes of 100 servo runs of each robot, checked agai
 files: setup-dev  ## read robot files of others again (OTHERS=folder with clones of their repositories: studies/files)
 	@HRSYNTH_OTHERS="$(abspath $(OTHERS))" $(PYTEST) tests/description/foreign/test_others.py
 
-parroblib: setup-dev  ## compare published tables of robots with what is computed (TABLES=folder; an hour; a broken-off run goes on)
+parroblib: setup-dev  ## compare published tables of robots with what is computed (TABLES=folder; an hour; an interrupted run continues)
 	@test -d "$(TABLES)" || { echo "TABLES=FOLDER: a folder of published tables (studies/parroblib/README.md)" >&2; exit 2; }
 	@mkdir -p build && cd studies && ../$(BIN)/python -m parroblib audit "$(abspath $(TABLES))" --sample 2200 -o ../build/parroblib.jsonl
 

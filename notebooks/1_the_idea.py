@@ -7,8 +7,8 @@
 #
 # Which poses can such a controller reach, and where does it fail? The papers answer with a second mechanism, the
 # *hidden robot*: its motor coordinates are the measured values. It has its own assembly modes and singularities, and
-# they are those of the controller. This notebook finds it for the smallest example, a planar five-bar. (MMT is Briot et
-# al., *Mechanism and Machine Theory* 106, 2016; see the README.)
+# these limit the controller. This notebook finds it for the smallest example, a planar five-bar. (MMT is Briot et al.,
+# *Mechanism and Machine Theory* 106, 2016; see the README.)
 
 # %%
 import matplotlib.pyplot as plt
