@@ -17,7 +17,7 @@ LOCK = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generat
 	--no-annotate --custom-compile-command "make lock" $(LOCKFLAGS) pyproject.toml --group build
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all test-long golden fuzz adversary bounds endings files parroblib bench lint types index robots readme catalog notebooks jupyter docs pictures lock three release setup setup-dev setup-all setup-browser clean
+.PHONY: help demo test test-all test-long golden fuzz adversary bounds equilibria files parroblib bench lint types index robots readme catalog notebooks jupyter docs pictures lock three release setup setup-dev setup-all setup-browser clean
 .DELETE_ON_ERROR:
 
 help:  ## this list
@@ -40,13 +40,13 @@ test-long: setup-all  ## the tests that are left: all members of each law, many 
 fuzz: setup-dev  ## 100,000 mutations of robot files (MUTATIONS=, SEED=): each is read or refused
 	@$(BIN)/python tests/description/foreign/fuzz.py --count $(MUTATIONS) --seed $(SEED)
 
-golden: setup-all  ## what every command answers, held against the golden files (ONLY=TEXT: cases that hold it; an hour)
+golden: setup-all  ## compare the output of every command with the golden files (ONLY=TEXT: cases that contain it; an hour)
 	@cd tests && OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 ../$(BIN)/python -m golden.run compare --only "$(ONLY)" --workers $(JOBS)
 
 bounds: setup-dev  ## 10,000 random instances of every family of assembly modes (INSTANCES=10000; half an hour)
 	@cd tests && OMP_NUM_THREADS=1 ../$(BIN)/python -m analysis.modes.bounds $(INSTANCES)
 
-adversary: setup-dev  ## brute force against the answers for random robots (COUNT=300, SEED=0); a broken-off run goes on
+adversary: setup-dev  ## compare results for random robots with brute force (COUNT=300, SEED=0); an interrupted run continues
 	@mkdir -p build && cd tests && OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 ../$(BIN)/python -m adversary.run \
 		--count $(COUNT) --seed $(SEED) --workers $(JOBS) --log ../build/adversary.jsonl
 
@@ -57,7 +57,7 @@ types: setup-dev  ## type check
 	@$(BIN)/mypy
 	@$(BIN)/mypy --config-file tests/mypy.ini
 
-index: setup  ## what `import hrsynth` and the command line know of all analyses, from their declarations
+index: setup  ## register all analyses for `import hrsynth` and the command line, from their declarations
 	@$(BIN)/python -c "from hrsynth.index import write; write()"
 
 robots: setup  ## regenerate robots/*.urdf from the families
@@ -67,7 +67,7 @@ readme: setup  ## regenerate the tables of robots/README.md, docs/pages and stud
 	@cd docs && ../$(BIN)/python -m tables
 	@cd studies && PYTHONPATH=../docs ../$(BIN)/python -m parroblib.says
 
-catalog: setup-all  ## build catalog/, or go on where that was broken off (JOBS= processes; hours)
+catalog: setup-all  ## build catalog/, or continue an interrupted build (JOBS= processes; hours)
 	@$(BIN)/hrsynth catalog build --workers $(JOBS)
 
 notebooks: setup-all  ## write notebooks/*.ipynb from their scripts, without outputs
@@ -80,21 +80,21 @@ jupyter: setup-all  ## open the notebooks in Jupyter, which is fetched the first
 docs: setup-all  ## run the notebooks that changed and build the site in build/site
 	@NO_MKDOCS_2_WARNING=1 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/mkdocs build --quiet --strict
 
-endings: setup-dev  ## how 100 far servo runs of every robot end, checked, against the lists, as tables in studies/endings (an hour; a broken-off run goes on)
+equilibria: setup-dev  ## outcomes of 100 servo runs of each robot, checked against the lists, as tables in studies/equilibria (an hour; an interrupted run continues)
 	@mkdir -p build && cd tests && OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 ../$(BIN)/python -m simulation.far 100 --random 57 \
-		--log ../build/far.jsonl -o ../studies/endings/README.md
+		--log ../build/far.jsonl -o ../studies/equilibria/README.md
 
 files: setup-dev  ## read robot files of others again (OTHERS=folder with clones of their repositories: studies/files)
 	@HRSYNTH_OTHERS="$(abspath $(OTHERS))" $(PYTEST) tests/description/foreign/test_others.py
 
-parroblib: setup-dev  ## compare published tables of robots with what is computed (TABLES=folder; an hour; a broken-off run goes on)
+parroblib: setup-dev  ## compare published tables of robots with what is computed (TABLES=folder; an hour; an interrupted run continues)
 	@test -d "$(TABLES)" || { echo "TABLES=FOLDER: a folder of published tables (studies/parroblib/README.md)" >&2; exit 2; }
 	@mkdir -p build && cd studies && ../$(BIN)/python -m parroblib audit "$(abspath $(TABLES))" --sample 2200 -o ../build/parroblib.jsonl
 
 bench: setup-all  ## run the benchmarks and write their table in benchmarks/ (some minutes)
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python benchmarks/table.py benchmarks/README.md
 
-pictures: setup-all setup-browser  ## draw the pictures in docs/pictures again (ten minutes)
+pictures: setup-all setup-browser  ## draw the figures in docs/pictures (some minutes)
 	@$(BIN)/python docs/pictures.py
 
 lock: setup-dev  ## resolve the dependencies again (LOCKFLAGS=--upgrade: to the newest versions)

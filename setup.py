@@ -1,4 +1,4 @@
-"""What pyproject.toml cannot say: the README as long description, its links made to work away from the repository."""
+"""Add the README as long description, its links made absolute, which pyproject.toml cannot express."""
 
 import re
 import tomllib
@@ -7,17 +7,17 @@ from pathlib import Path
 from setuptools import setup
 
 ROOT = Path(__file__).parent
-PICTURES = (".png", ".svg", ".gif")
+IMAGES = (".png", ".svg", ".gif")
 
 
 def long_description() -> str:
-    """The README; pages lead to the repository at this version's tag, pictures to their raw files."""
+    """Return the README with links to the repository at this version's tag; figures link to their raw files."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     module = (ROOT / "src" / "hrsynth" / "version.py").read_text(encoding="utf-8")
     version = re.search(r'^__version__ = "(.*)"', module, re.MULTILINE)[1]
 
     def absolute(link: re.Match[str]) -> str:
-        kind = "raw" if link[1].endswith(PICTURES) else "blob"
+        kind = "raw" if link[1].endswith(IMAGES) else "blob"
         return f"]({project['urls']['Repository']}/{kind}/v{version}/{link[1]})"
 
     return re.sub(r"\]\((?!https?://|mailto:|#)([^)\s]+)\)", absolute, (ROOT / "README.md").read_text(encoding="utf-8"))

@@ -1,4 +1,4 @@
-"""How long `hrsynth basins` takes: starts of a plane abreast, as many processes as cores, against one `servo` for each
+"""Time of `hrsynth basins`: starts of a plane, batched, as many processes as cores, against one `servo` for each
 (a few of them), in one run; then the same share of the work in one process, by processor time.
 
     OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python benchmarks/basins.py [STARTS A SIDE [SINGLE RUNS]]
@@ -23,7 +23,7 @@ CASES = (
 def main(side: int = 100, single: int = 10) -> None:
     """Print the table."""
     print(
-        f"| robot | legs | starts | abreast, {os.cpu_count()} processes (s) | one process, processor (s) "
+        f"| robot | legs | starts | batched, {os.cpu_count()} processes (s) | one process, processor (s) "
         "| one by one (s a run) | ratio |"
     )
     print("| --- | --- | ---: | ---: | ---: | ---: | ---: |")

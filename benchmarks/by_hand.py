@@ -1,6 +1,6 @@
-"""What a researcher writes by hand for one robot: vectorised NumPy closed forms, nothing of the package.
+"""Closed forms of single robots, written by hand in vectorised NumPy, without the package.
 
-Quattro (MMT Appendix B.1) with its articulated platform, two legs watched, one on each half: inverse kinematics of
+Quattro (MMT Appendix B.1) with its articulated platform, two legs observed, one on each half: inverse kinematics of
 all four legs, Mᵀ (6 × 4), and the exact maxima of position and orientation error for two cones. The rigid Quattro,
 the Gough-Stewart platform, the Orthoglide and the 3-RRR: Mᵀ alone.
 
@@ -74,7 +74,7 @@ def maxima(M: Array, cone: float) -> tuple[Array, Array]:
 
 
 def maxima_tuned(M: Array, cone: float) -> tuple[Array, Array]:
-    """The same, tuned: Gram and Schmidt, and eigenvalues in closed form, components first."""
+    """Tuned version of :func:`largest`: Gram and Schmidt, and eigenvalues in closed form, components first."""
     Q, R = np.ascontiguousarray(M.transpose(1, 2, 0)), np.zeros((4, 4, len(M)))
     for j in range(4):
         R[j, j] = np.sqrt(np.einsum("rn,rn->n", Q[:, j], Q[:, j]))

@@ -1,4 +1,4 @@
-"""Lines of the table: generated code for controllers, against MuJoCo and Pinocchio brought to the same answer."""
+"""Lines of the table: generated code for controllers, against MuJoCo and Pinocchio with the same result."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 
 POSES = 2000
-"""Motor coordinates at which each side answers."""
+"""Motor coordinates of the comparison."""
 ROBOTS = {"rrrrr_m1": 0.05, "3rrr_m1": 0.02}
 """Robots, and half the width of their boxes (rad)."""
 OURS = """

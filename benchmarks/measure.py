@@ -1,4 +1,4 @@
-"""How both sides of a benchmark are measured, and what a line of the table says."""
+"""Measure both sides of a benchmark, and write the rows of the table."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def compiled(robot: str) -> tuple[ObservedRobot, Batch]:
 
 
 def plane(batch: Batch, size: float, phi: float = 0.0, side: int = SIDE) -> Array:
-    """A square of poses around home, turned by phi about z; (side², 4, 4)."""
+    """A square of poses around the zero configuration, rotated by phi about z; (side², 4, 4)."""
     steps = np.linspace(-size, size, side)
     X = np.tile(batch.home, (side * side, 1, 1))
     X[:, 0, 3] += np.repeat(steps, side)
@@ -80,7 +80,7 @@ def same(ours: Array, theirs: Array, tolerance: float) -> None:
         raise SystemExit(f"the two sides differ by {worst:.2g}, allowed: {tolerance:.2g}")
 
 
-def told(ours: str, what: str, mine: float, other: str, theirs: float, n: int, m: int | None = None) -> Row:
+def compare(ours: str, what: str, mine: float, other: str, theirs: float, n: int, m: int | None = None) -> Row:
     rate, their_rate = n / mine, (m or n) / theirs
     return (
         what,

@@ -1,4 +1,4 @@
-"""How long all modes of random platforms take, with their proof, next to Newton's method from many starts.
+"""Time until all modes of random platforms take, with their proof, next to Newton's method from many starts.
 
     python benchmarks/modes.py [instances]
 

@@ -1,4 +1,4 @@
-"""Lines of the table: assembly modes, the loops' Jacobian, derivations, exact verdicts and entries of the catalog."""
+"""Rows of the table: assembly modes, loop Jacobian, derivations, exact verdicts and entries of the catalog."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ EVALUATIONS = 2000
 AROUND = 0.1
 """How far these are from the zero configuration (rad, m)."""
 GROWTH = (500, 1600, 5000)
-"""Words of the catalog that are made in one build."""
+"""Keys of the catalog that are computed in one build."""
 LIMIT = 0.3
-"""Within which a SQLite file answers (s)."""
+"""Longest time of a query of a SQLite file (s)."""
 EXACT, WHOLE, CORES = 12, 3, 2
-"""Words of each group of the catalog of which the exact verdict is made on each core, and the whole entry; cores."""
+"""Keys of each group of the catalog: for the exact verdict on each core, and for the whole entry; cores."""
 
 
 def modes() -> Iterator[Row]:
@@ -92,7 +92,7 @@ def modes() -> Iterator[Row]:
 
 
 def platforms() -> Iterator[Row]:
-    """All 40 poses of six-legged platforms with their motors held, proved, against msolve, enclosed and proved too."""
+    """All 40 poses of six-legged platforms with their motors fixed, proved, against msolve, enclosed and proved too."""
     from analysis.modes.draws import dietmaier, spatial
     from analysis.modes.laws import installed
     from hrsynth.analysis.modes.solve import solve, solve_by_msolve
@@ -110,7 +110,7 @@ def platforms() -> Iterator[Row]:
         )
         each, other = 1e3 * ours / len(systems), 1e3 * theirs / max(1, len(few))
         against = (f"msolve, with the same proof: {other:.0f} ms", f"{other / each:.0f}") if few else ("–", "–")
-        yield (f"all 40 poses with proof, motors held: {what}", f"{each:.0f} ms each", *against)
+        yield (f"all 40 poses with proof, motors fixed: {what}", f"{each:.0f} ms each", *against)
 
 
 def jacobians() -> Iterator[Row]:
@@ -161,7 +161,7 @@ def jacobians() -> Iterator[Row]:
             lambda theirs=theirs, others=others: deque(map(theirs, others), 0),
         )
         yield (
-            f"the loops' Jacobian of one configuration, {robot}",
+            f"the loop Jacobian of one configuration, {robot}",
             f"{1e6 * mine / EVALUATIONS:.1f} µs ({' × '.join(map(str, robot_model.jacobian(robot_model.q0).shape))})",
             f"MuJoCo on the written MJCF: {1e6 * other_time / EVALUATIONS:.1f} µs ({' × '.join(map(str, J.shape))})",
             f"{other_time / mine:.1f}",
@@ -178,7 +178,7 @@ def derivations() -> Row:
     spent.sort()
     middle, slowest = spent[len(spent) // 2][0], spent[-1]
     return (
-        "the hidden robot with its certificate, each shipped robot, all legs watched",
+        "the hidden robot with its equivalence check, each shipped robot, all legs observed",
         f"median {middle:.2f} s, slowest {slowest[0]:.2f} s ({slowest[1]})",
         "nobody's",
         "–",
@@ -186,7 +186,7 @@ def derivations() -> Row:
 
 
 def catalog() -> Iterator[Row]:
-    """Exact verdicts of words of all groups whose configurations are there, and whole entries."""
+    """Exact verdicts of keys of all groups for given configurations, and whole entries."""
     halves = [
         subprocess.Popen([sys.executable, __file__, str(seed)], stdout=subprocess.PIPE, text=True)
         for seed in range(CORES)
@@ -204,7 +204,7 @@ def catalog() -> Iterator[Row]:
     refused = sum("refused" in entry(word) for word in words)
     rate = len(words) / (spent() - start)
     yield (
-        f"whole entries of {len(words)} words ({refused} refused), drawing, derivation and confirmation included",
+        f"whole entries of {len(words)} keys ({refused} refused), drawing, derivation and confirmation included",
         f"{rate:.1f} a second on one core",
         "nobody's",
         "–",
@@ -229,31 +229,31 @@ def catalog() -> Iterator[Row]:
             )
             for count in GROWTH
         ]
-        yield questions(Path(folder) / "all.sqlite")
+        yield measure_queries(Path(folder) / "all.sqlite")
     yield f"catalog build planar, the first {', '.join(f'{count:,}' for count in GROWTH)}", "; ".join(cells), "–", "–"
 
 
-def questions(file: Path) -> Row:
-    """Questions of ``catalog list`` about the shipped records in a SQLite file, which is written here: until the lines
-    that are printed are there."""
+def measure_queries(file: Path) -> Row:
+    """Queries of ``catalog list`` on the shipped records in a SQLite file that is written here: time until the printed
+    lines are ready."""
     from catalog.stub import QUESTIONS
 
     kept = store.shipped_folder()
     store.write_tables(file, {group: kept.lines([group], {}) for group in kept.groups()})
 
-    def told(path: Path | None, asked: dict[str, Any]) -> str:
-        return entries(load_catalog(path, **asked).records, count(path, **asked))
+    def query(path: Path | None, options: dict[str, Any]) -> str:
+        return entries(load_catalog(path, **options).records, count(path, **options))
 
     every = sorted(
-        ((least(partial(told, file, asked), turns=3)[0], asked) for asked in QUESTIONS), key=lambda each: each[0]
+        ((least(partial(query, file, options), turns=3)[0], options) for options in QUESTIONS), key=lambda each: each[0]
     )
-    ours, asked = every[-1]
-    (theirs,) = least(partial(told, None, asked), turns=1)
-    if told(file, asked) != told(None, asked):
-        raise SystemExit(f"{asked}: the SQLite file and the lines differ")
+    ours, options = every[-1]
+    (theirs,) = least(partial(query, None, options), turns=1)
+    if query(file, options) != query(None, options):
+        raise SystemExit(f"{options}: the SQLite file and the lines differ")
     return (
-        f"{len(every)} questions of catalog list about {sum(map(kept.count, kept.groups())):,} records in a SQLite "
-        f"file; the slowest is {asked}",
+        f"{len(every)} queries of catalog list on {sum(map(kept.count, kept.groups())):,} records in a SQLite "
+        f"file; the slowest is {options}",
         f"median {1e3 * every[len(every) // 2][0]:.0f} ms, slowest {1e3 * ours:.0f} ms, "
         f"{sum(each <= LIMIT for each, _ in every)} within {1e3 * LIMIT:.0f} ms",
         f"the slowest by reading all lines: {1e3 * theirs:.0f} ms",
@@ -270,13 +270,13 @@ def verdicts(seed: int) -> float:
 
 
 def _chosen(seed: int) -> list[list[str]]:
-    """Random words of each group, more than are needed."""
+    """Random keys of each group, more than needed."""
     rng = random.Random(seed)
     return [rng.sample(sorted({without_motors(word) for word in make()}), 3 * EXACT) for make in GROUPS.values()]
 
 
 def _prepared(words: list[str]) -> Iterator[ObservedRobot]:
-    """The first ``EXACT`` of the words whose robots move."""
+    """The first ``EXACT`` of the keys whose robots move."""
     found = 0
     for word in words:
         try:

@@ -1,4 +1,4 @@
-"""What a hidden robot of three image points costs beside one of three directions: ``python benchmarks/sensors.py``."""
+"""Time of a hidden robot of three image points, and of one of three directions: ``python benchmarks/sensors.py``."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ ROBOT = "gough_stewart"
 POINTS = [f"point:platform@{at}" for at in ("0.1,0,0", "-0.1,0.1,0", "0,0.1,0.1")]
 
 
-def asked(**options: object) -> None:
-    """The question, with nothing remembered."""
+def check(**options: object) -> None:
+    """Run the analysis without caches."""
     clear_cache()
     derive(ROBOT, **options)  # type: ignore[arg-type]
 
 
 if __name__ == "__main__":
     directions, points = least(
-        lambda: asked(observe="1,2,3"), lambda: asked(camera="eye=base@0.3,0.1,0", sensor=POINTS)
+        lambda: check(observe="1,2,3"), lambda: check(camera="cam=base@0.3,0.1,0", sensor=POINTS)
     )
     print(f"three directions {directions:.3f} s, three image points {points:.3f} s: {points / directions:.2f} times")

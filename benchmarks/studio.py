@@ -1,4 +1,4 @@
-"""What the studio's page waits for: moves a second of each shipped robot along its sliders, the hidden robot beside it,
+"""Response times of the studio: moves a second of each shipped robot along its sliders, the hidden robot beside it,
 and the time until a leg that is ticked is judged. One process, by processor time and by the clock.
 
     OMP_NUM_THREADS=1 python benchmarks/studio.py [ROBOT …]

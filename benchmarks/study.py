@@ -1,4 +1,4 @@
-"""A study: how near to a singularity are 1,000 poses of 20 robots, 50 of each? In parallel processes.
+"""A study in parallel processes: singularity distances of 1,000 poses of 20 robots, 50 of each.
 
 OMP_NUM_THREADS=1 python benchmarks/study.py [JOBS]
 """
@@ -14,16 +14,16 @@ ROBOTS = list(hrsynth.list_robots())[:20]
 POSES = 50
 
 
-def weakest(robot: object) -> list[float | None]:
+def singular_values(robot: object) -> list[float | None]:
     """The smallest singular value of Mᵀ at random reachable poses of a robot."""
-    seen = hrsynth.observe(robot, samples=POSES)
-    poses = [at.pose(seen.motion.link) for at in seen.configurations]
-    return [hrsynth.check(seen, at=pose).postures[0].distances.type2 for pose in poses]
+    setup = hrsynth.observe(robot, samples=POSES)
+    poses = [at.pose(setup.motion.link) for at in setup.configurations]
+    return [hrsynth.check(setup, at=pose).postures[0].distances.type2 for pose in poses]
 
 
 if __name__ == "__main__":
     start = time.perf_counter()
-    found = hrsynth.map_robots(weakest, ROBOTS, jobs=int(sys.argv[1]) if len(sys.argv) > 1 else None)
+    found = hrsynth.map_robots(singular_values, ROBOTS, jobs=int(sys.argv[1]) if len(sys.argv) > 1 else None)
     took = time.perf_counter() - start
     for name, values in zip(ROBOTS, found, strict=True):
         known = [value for value in values if value is not None]

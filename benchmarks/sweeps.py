@@ -17,7 +17,7 @@ from dataclasses import replace
 
 import by_hand
 import numpy as np
-from measure import Row, Run, compiled, least, plane, same, threads, told
+from measure import Row, Run, compare, compiled, least, plane, same, threads
 
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.batch.engine import Batch
@@ -77,15 +77,15 @@ def exact_maxima() -> Iterator[Row]:
     what = "Mᵀ and both exact error maxima, quattro, two legs, 40,401 poses"
     linear = "NumPy for this robot, `linalg`"
     mine = "NumPy for this robot, eigenvalues in closed form"
-    yield told("numba", what, numba, linear, by, len(X))
-    yield told("NumPy", what, plain, linear, by, len(X))
-    yield told("numba", what, numba, mine, own, len(X))
-    yield told("NumPy", what, plain, mine, own, len(X))
-    yield told("numba", what, numba, "a loop over Pinocchio", looped, len(X), len(some))
-    yield told("NumPy", what, plain, "a loop over Pinocchio", looped, len(X), len(some))
+    yield compare("numba", what, numba, linear, by, len(X))
+    yield compare("NumPy", what, plain, linear, by, len(X))
+    yield compare("numba", what, numba, mine, own, len(X))
+    yield compare("NumPy", what, plain, mine, own, len(X))
+    yield compare("numba", what, numba, "a loop over Pinocchio", looped, len(X), len(some))
+    yield compare("NumPy", what, plain, "a loop over Pinocchio", looped, len(X), len(some))
     with threads(cores := len(os.sched_getaffinity(0))):
         numba, own = least(ours(True), tuned, clock=time.perf_counter)
-    yield told(f"numba, {cores} threads, by the clock", what, numba, mine, own, len(X))
+    yield compare(f"numba, {cores} threads, by the clock", what, numba, mine, own, len(X))
 
 
 def matrices() -> Iterator[Row]:
@@ -108,8 +108,8 @@ def matrices() -> Iterator[Row]:
             theirs,
         )
         what = f"Mᵀ alone, {robot}, {len(legs)} legs"
-        yield told("numba", what, numba, "NumPy for this robot", by, len(X))
-        yield told("NumPy", what, plain, "NumPy for this robot", by, len(X))
+        yield compare("numba", what, numba, "NumPy for this robot", by, len(X))
+        yield compare("NumPy", what, plain, "NumPy for this robot", by, len(X))
 
 
 def units(batch: Batch, M: Array) -> Array:
@@ -183,7 +183,7 @@ def other_twists() -> Iterator[Row]:
             if batch.slides
             else ("whose platform has other twists at each pose")
         )
-        yield told(
+        yield compare(
             "NumPy",
             f"Mᵀ alone, all legs, {robot}, {why}",
             ours,

@@ -1,5 +1,4 @@
-"""Pages of the site that are made while it is built: the README, the executed notebooks, the gallery, the reference;
-and formulas, set as drawings that need no network."""
+"""Generate pages while the site is built: README, executed notebooks, gallery, reference; set formulas as SVG."""
 
 from __future__ import annotations
 
@@ -31,9 +30,9 @@ LINKS = {
     "notebooks/README.md": "notebooks/index.md",
     "robots/README.md": "robots.md",
 }
-"""Where what the README links to lies in the site."""
+"""Links of the README, and their targets in the site."""
 QUICK = "HRSYNTH_DOCS_QUICK"
-"""Environment variable: notebooks of which no executed copy is kept are shown without outputs."""
+"""Environment variable: notebooks without a stored executed copy are shown without outputs."""
 FOLDERS = (
     "geometry",
     "mechanism",
@@ -54,7 +53,7 @@ FOLDERS = (
 
 
 def on_files(files: Any, config: Any) -> Any:
-    """Add the pages that lie elsewhere or are made."""
+    """Add pages of other folders and generated pages."""
     from mkdocs.structure.files import File
 
     for name, content in made():
@@ -63,7 +62,7 @@ def on_files(files: Any, config: Any) -> Any:
 
 
 def made() -> Iterator[tuple[str, str | bytes]]:
-    """Name and content of each page and picture that is made."""
+    """Yield name and content of each generated page and figure."""
     for name, source in (
         ("readme.md", "README.md"),
         ("contributing.md", "CONTRIBUTING.md"),
@@ -87,12 +86,12 @@ def made() -> Iterator[tuple[str, str | bytes]]:
 
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
-    """A page of ``docs/pages`` with its pictures where the site has them, and its formulas set."""
+    """Return a page of ``docs/pages`` with the site's links of figures and with formulas as SVG."""
     return typeset(markdown.replace("](../pictures/", "](pictures/"))
 
 
 def typeset(markdown: str) -> str:
-    """Formulas between dollars as drawings, outside of code: ``$$…$$`` on lines of their own, ``$…$`` in a line."""
+    """Replace formulas between dollars by SVG, outside of code: ``$$…$$`` on lines of their own, ``$…$`` in a line."""
     parts = re.split(r"(^ *```.*?^ *```$|`[^`\n]*`|<pre>.*?</pre>)", markdown, flags=re.MULTILINE | re.DOTALL)
     for place in range(0, len(parts), 2):
         found = re.sub(
@@ -107,7 +106,7 @@ def typeset(markdown: str) -> str:
 
 @cache
 def drawn(formula: str) -> str:
-    """A formula (the part of LaTeX that matplotlib knows) as SVG, on the line of the text around it."""
+    """Return a formula (in the LaTeX subset of matplotlib) as SVG, aligned with its line of text."""
     from matplotlib import mathtext, rc_context
 
     stream = io.StringIO()
@@ -125,18 +124,18 @@ def drawn(formula: str) -> str:
     width, height = (float(value) / 10 for value in re.findall(r'(?:width|height)="([0-9.]+)pt"', text)[:2])
     text = re.sub(r'width="[0-9.]+pt"', f'width="{width:.3f}em"', text, count=1)
     text = re.sub(r'height="[0-9.]+pt"', f'height="{height:.3f}em"', text, count=1)
-    said = html.escape(formula, quote=True)
+    label = html.escape(formula, quote=True)
     text = text.replace(
-        "<svg ", f'<svg class="math" role="img" aria-label="{said}" style="vertical-align: {-depth / 10:.3f}em" ', 1
+        "<svg ", f'<svg class="math" role="img" aria-label="{label}" style="vertical-align: {-depth / 10:.3f}em" ', 1
     )
     return re.sub(r"\s*\n\s*", " ", text).strip()
 
 
 def gallery() -> str:
-    """Every picture that is kept, with the command that draws it."""
+    """Return the page of all figures, each with the command that draws it."""
     head = (
-        "---\nhide: [toc]\n---\n\n# Gallery\n\nEvery picture is drawn by one command, shown below it; "
-        '`make pictures` draws them all again.\n\n<div class="gallery" markdown>\n'
+        "---\nhide: [toc]\n---\n\n# Gallery\n\nThe command below each figure draws it; "
+        '`make pictures` draws all.\n\n<div class="gallery" markdown>\n'
     )
     cells = []
     for name in pictures.PICTURES:
@@ -150,14 +149,14 @@ def gallery() -> str:
 
 
 def relinked(text: str) -> str:
-    """A page of the project's own folder with its links turned to the site's."""
+    """Return a page of the root folder with the links of the site."""
     for old, new in LINKS.items():
         text = text.replace(f"]({old}", f"]({new}")
     return underlined(text)
 
 
 def underlined(text: str) -> str:
-    """Motors underlined by markup, outside of blocks of code: not every font has the combining line."""
+    """Underline motors by markup, outside of code blocks: not every font has the combining line."""
     parts = re.split(r"(^```.*?^```$)", text, flags=re.MULTILINE | re.DOTALL)
     return "".join(part if place % 2 else _underlined(part) for place, part in enumerate(parts))
 
@@ -168,8 +167,8 @@ def _underlined(text: str) -> str:
 
 
 def lesson(script: Path) -> Iterator[tuple[str, str | bytes]]:
-    """The page of a notebook with its outputs, and its pictures."""
-    page, pictures = [], 0
+    """Yield the page of a notebook with its outputs, and its figures."""
+    page, figures = [], 0
     run = lessons.kept(script).exists() or os.environ.get(QUICK) is None
     for cell in (lessons.executed(script) if run else lessons.notebook(script)).cells:
         if cell.cell_type == "markdown":
@@ -179,15 +178,15 @@ def lesson(script: Path) -> Iterator[tuple[str, str | bytes]]:
         for output in cell.get("outputs", []):
             data = output.get("data", {})
             if "image/png" in data:
-                pictures += 1
-                name = f"{script.stem}_{pictures}.png"
+                figures += 1
+                name = f"{script.stem}_{figures}.png"
                 yield f"notebooks/{name}", base64.b64decode(data["image/png"])
-                shown.append(f"![Picture {pictures} of this notebook: {caption(data)}]({name})")
+                shown.append(f"![Figure {figures} of this notebook: {caption(data)}]({name})")
             elif "image/svg+xml" in data:
-                pictures += 1
-                name = f"{script.stem}_{pictures}.svg"
+                figures += 1
+                name = f"{script.stem}_{figures}.svg"
                 yield f"notebooks/{name}", data["image/svg+xml"]
-                shown.append(f"![Picture {pictures} of this notebook: {caption(data)}]({name})")
+                shown.append(f"![Figure {figures} of this notebook: {caption(data)}]({name})")
             elif "text/html" in data:
                 shown.append(f'<div class="output">{data["text/html"]}</div>')
             elif text := output.get("text") or data.get("text/plain"):
@@ -197,27 +196,27 @@ def lesson(script: Path) -> Iterator[tuple[str, str | bytes]]:
 
 
 def caption(data: Any) -> str:
-    """The words under a picture: those of a result, else that it is a plot."""
-    text = re.sub(r"^<Picture: (.*)>$", r"\1", data.get("text/plain", ""))
+    """Return the caption of a figure: that of a result, else 'a plot'."""
+    text = re.sub(r"^<(?:Picture|Drawing): (.*)>$", r"\1", data.get("text/plain", ""))
     return "a plot" if text.startswith("<Figure") else text.replace("[", "(").replace("]", ")")
 
 
 def folded(parts: list[str]) -> str:
-    """A block that opens when it is asked for."""
+    """Return a block that opens on click."""
     inside = "\n\n".join(parts)
     return '??? success "Solution"\n\n' + "\n".join(f"    {line}" if line else "" for line in inside.splitlines())
 
 
 def public() -> str:
-    """What ``import hrsynth`` offers, in the order of its table of names."""
+    """Return the page of public names, in the order of the index."""
     from hrsynth.index import homes
 
-    head = "# Public functions\n\n`import hrsynth` offers these names; each is imported when it is first used."
+    head = "# Public functions\n\n`import hrsynth` provides these names; each is imported at its first use."
     return "\n\n".join([head, *(f"::: hrsynth.{module}.{name}" for name, module in homes().items())])
 
 
 def records() -> str:
-    """The JSON schemas of all commands."""
+    """Return the page of JSON schemas of all commands."""
     from hrsynth.cli.schema import page
 
     return page()
@@ -230,7 +229,7 @@ def build_reference() -> Iterator[tuple[str, str]]:
 
 
 def modules(folder: str) -> str:
-    """Every module of a folder of the package: first what a user calls, then the modules, those first that hold it."""
+    """Return the page of a folder of the package: public names, then modules, those with public names first."""
     from hrsynth.index import homes
 
     names = [
@@ -248,14 +247,14 @@ def modules(folder: str) -> str:
         for module, each in sorted(called.items())
         for name in each
     ]
-    head = "\n".join([f"# {folder}", "", *(["What `import hrsynth` offers of it:", "", *lines, ""] if lines else [])])
+    head = "\n".join([f"# {folder}", "", *(["Public names of this folder:", "", *lines, ""] if lines else [])])
     return head + "\n\n" + "\n\n".join(f"::: {name}\n    options:\n      heading_level: 2" for name in order)
 
 
 def first_line(module: str, name: str) -> str:
-    """The first line of what a public name says of itself."""
-    place = PACKAGE.parent.joinpath(*module.split("."))
-    source = place / "__init__.py" if place.is_dir() else place.with_suffix(".py")
+    """Return the first paragraph of the docstring of a public name."""
+    base = PACKAGE.parent.joinpath(*module.split("."))
+    source = base / "__init__.py" if base.is_dir() else base.with_suffix(".py")
     for node in ast.parse(source.read_text(encoding="utf-8")).body:
         if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == name:
             return (ast.get_docstring(node) or "").split("\n\n")[0].replace("\n", " ")

@@ -1,4 +1,4 @@
-"""Notebooks and the scripts they are paired with: a script is the source, its notebook has no outputs.
+"""Notebooks and their paired scripts: a script is the source, its notebook has no outputs.
 
 ``python docs/lessons.py`` writes each ``notebooks/*.ipynb`` from the ``.py`` of its name. An executed copy is kept in
 ``build/notebooks`` until the script or the package changes.
@@ -16,17 +16,17 @@ ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "notebooks"
 EXECUTED = ROOT / "build" / "notebooks"
 TIMEOUT = 300
-"""Seconds that a cell, or the start of the kernel, may take."""
+"""Longest time (s) of a cell, or of the start of the kernel."""
 KERNEL = {"display_name": "Python 3 (ipykernel)", "language": "python", "name": "python3"}
 
 
 def scripts() -> list[Path]:
-    """The scripts, in their order."""
+    """Return the scripts in order."""
     return sorted(FOLDER.glob("[0-9]*.py"), key=lambda path: int(path.stem.split("_")[0]))
 
 
 def notebook(script: Path) -> Any:
-    """The notebook of a script: its cells numbered, no outputs."""
+    """Return the notebook of a script: cells numbered, no outputs."""
     import jupytext
 
     made = jupytext.reads(script.read_text(encoding="utf-8"), fmt="py:percent")
@@ -42,14 +42,14 @@ def notebook(script: Path) -> Any:
 
 
 def text(script: Path) -> str:
-    """What the paired file ``.ipynb`` holds."""
+    """Return the content of the paired file ``.ipynb``."""
     import nbformat
 
     return nbformat.writes(notebook(script)) + "\n"
 
 
 def pair() -> list[Path]:
-    """Write every notebook from its script; those that changed."""
+    """Write every notebook from its script; return those that changed."""
     changed = []
     for script in scripts():
         file, wanted = script.with_suffix(".ipynb"), text(script)
@@ -60,14 +60,14 @@ def pair() -> list[Path]:
 
 
 def kept(script: Path, folder: Path = EXECUTED) -> Path:
-    """Where the executed copy is kept while neither the script nor the package changes."""
+    """Return the path of the executed copy; it changes with the script and the package."""
     return folder / f"{script.stem}.{_state(script)}.ipynb"
 
 
 def executed(script: Path, folder: Path = EXECUTED) -> Any:
-    """The notebook with its outputs: the kept copy, or run now.
+    """Return the notebook with its outputs: the stored copy, or run now.
 
-    Raises ``nbclient.exceptions.CellExecutionError`` where a cell fails.
+    Raises ``nbclient.exceptions.CellExecutionError`` if a cell fails.
     """
     import nbformat
     from nbclient import NotebookClient
@@ -99,7 +99,7 @@ def _state(script: Path) -> str:
 
 @cache
 def _package() -> bytes:
-    """What the outputs depend on besides the script: the package and its robots."""
+    """Return the hash of the package and its robots, on which outputs depend besides the script."""
     found = hashlib.sha256()
     for pattern in ("src/hrsynth/**/*.py", "robots/*.urdf"):
         for path in sorted(ROOT.glob(pattern)):

@@ -1,5 +1,6 @@
-"""Screens of the studio: one panel for ``docs/pictures.py``; or, to look at before and after a change, all panels of a
-robot on one sheet, wide ones above, as a telephone has them below: ``python docs/panels.py delta sheet.webp``."""
+"""Screens of the studio: one panel for ``docs/pictures.py``, or all panels of a robot on one sheet to compare versions.
+
+``python docs/panels.py delta sheet.webp`` draws a sheet: wide windows above, those of a telephone below."""
 
 from __future__ import annotations
 
@@ -18,14 +19,14 @@ sys.path.insert(0, str(TESTS))
 WIDE, NARROW = (1280, 800), (390, 844)
 """Windows (pixels)."""
 COLUMNS, WIDTH = 4, 2400
-"""Wide pictures in a row, and the width of a sheet (pixels)."""
+"""Wide screens in a row, and the width of a sheet (pixels)."""
 SLOW = 120_000
-"""Longest time that an answer may take (ms)."""
+"""Longest time of a result (ms)."""
 BUSY = "() => Object.values(studio.link.lanes).some(({ sent, waiting }) => sent || waiting.size)"
 
 
 def tilted(name: str, folder: Path) -> Path:
-    """A shipped robot on a tilted base."""
+    """Write a shipped robot on a tilted base."""
     from description.samples import moved
     from hrsynth import load, save
     from hrsynth.geometry.vectors import pose, rotation_about
@@ -36,7 +37,7 @@ def tilted(name: str, folder: Path) -> Path:
 
 
 def ankle(folder: Path) -> Path:
-    """A humanoid's ankle: a foot on a U joint and two legs."""
+    """Write a humanoid's ankle: a U joint and two legs."""
     from analysis.modes import ankles
     from hrsynth import save
 
@@ -46,7 +47,7 @@ def ankle(folder: Path) -> Path:
 
 
 def meshed(folder: Path) -> Path:
-    """A five-bar as a file of MuJoCo, with a mesh for each moving link."""
+    """Write a five-bar as MuJoCo file, with a mesh for each moving link."""
     import trimesh
 
     from hrsynth import load, save
@@ -78,7 +79,7 @@ ROBOTS: dict[str, Callable[[Path], str | Path]] = {
     "ankle": ankle,
     "five_bar_meshes": meshed,
 }
-"""What is opened, by the name of its sheet."""
+"""Robots by the names of their sheets."""
 
 
 def screen(name: str, key: str, file: Path) -> None:
@@ -117,12 +118,12 @@ def sheet(name: str, file: Path) -> None:
             tab.page.close()
         server.stop()
     wide, narrow = rows
-    tiles = [(picture, WIDTH // COLUMNS) for picture in wide] + [(picture, WIDTH // len(narrow)) for picture in narrow]
+    tiles = [(screen, WIDTH // COLUMNS) for screen in wide] + [(screen, WIDTH // len(narrow)) for screen in narrow]
     made = Image.new("RGB", (WIDTH, 10_000), "#5a6672")
     x = y = 0
-    for picture, width in tiles:
-        height = round(picture.height * width / picture.width)
-        made.paste(picture.resize((width - 4, height - 4), Image.Resampling.LANCZOS), (x, y))
+    for tile, width in tiles:
+        height = round(tile.height * width / tile.width)
+        made.paste(tile.resize((width - 4, height - 4), Image.Resampling.LANCZOS), (x, y))
         x += width
         if x + width > WIDTH:
             x, y = 0, y + height
@@ -130,7 +131,7 @@ def sheet(name: str, file: Path) -> None:
 
 
 def shown(page: Any) -> Iterator[str]:
-    """Bring one panel after the other into sight."""
+    """Show one panel after the other."""
     page.locator("body[data-ready=yes]").wait_for(timeout=SLOW)
     page.locator("#answer", has_text=re.compile(r"^(?!.*Working out)")).wait_for(timeout=SLOW)
     settled(page)
@@ -151,7 +152,7 @@ def shown(page: Any) -> Iterator[str]:
         boxes.last.uncheck()
     page.get_by_role("radio", name="Robot", exact=True).check()
     settled(page)
-    yield "lost"
+    yield "unobserved"
     page.locator(".sets button").first.click()
     settled(page)
     yield panel(page, "modes")
@@ -168,14 +169,14 @@ def shown(page: Any) -> Iterator[str]:
 
 
 def panel(page: Any, key: str) -> str:
-    """Look at a panel, with its answer there."""
+    """Open a panel and wait for its result."""
     page.locator(f"#tab-{key}").click()
     settled(page)
     return key
 
 
 def settled(page: Any) -> None:
-    """Wait until nothing is under way and all is drawn."""
+    """Wait until all is computed and drawn."""
     page.wait_for_timeout(400)
     for _ in range(SLOW // 100):
         if not page.evaluate(BUSY):

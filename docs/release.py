@@ -1,8 +1,8 @@
-"""A release: version, changelog and citation set, source archive and wheel built and tried, commit and tag.
+"""Make a release: set version, changelog and citation, build and test source archive and wheel, commit and tag.
 
     make release VERSION=0.3.0
 
-Nothing is uploaded or pushed; the last lines say how. What fails leaves neither commit nor tag.
+Nothing is uploaded or pushed; the last lines print how. A failure leaves neither commit nor tag.
 """
 
 from __future__ import annotations
@@ -40,17 +40,17 @@ NEEDED = (
     "benchmarks/table.py",
     "studies/parroblib/README.md",
 )
-"""What a source archive must hold, of each kind of file something."""
+"""Files that a source archive must contain, of each kind one."""
 ADDRESSES = ("pyproject.toml", "SECURITY.md")
 """Files with addresses of the project."""
 RESERVED = re.compile(r"\bhrsynth\.example\b")
-"""A name that RFC 2606 keeps free."""
+"""Name reserved by RFC 2606."""
 PACKAGED = ("hrsynth/robots/quattro.urdf", "hrsynth/catalog/shipped/mixed.jsonl.gz")
-"""What a wheel must hold besides all files of the package itself: where its links lead."""
+"""Files that a wheel must contain besides those of the package: targets of links."""
 
 
 class Refused(Exception):
-    """Why there is no release."""
+    """Reason why there is no release."""
 
 
 def main(version: str) -> None:
@@ -81,7 +81,7 @@ def main(version: str) -> None:
 
 
 def release_texts(version: str) -> dict[Path, str]:
-    """The files that name the version, with the new one; raises ``Refused``."""
+    """Return the files that name the version, with the new one; raise ``Refused`` if it is not valid."""
     package, changes, citation = ROOT / "src" / "hrsynth" / "version.py", ROOT / "CHANGELOG.md", ROOT / "CITATION.cff"
     code, log, cite = (path.read_text(encoding="utf-8") for path in (package, changes, citation))
     present = re.search(r'^__version__ = "(.*)"$', code, re.MULTILINE)[1]
@@ -105,12 +105,12 @@ def release_texts(version: str) -> dict[Path, str]:
 
 
 def numbers(version: str) -> tuple[int, ...]:
-    """To compare versions by."""
+    """Return the numbers of a version, for comparisons."""
     return tuple(map(int, version.split(".")))
 
 
 def placeholders() -> list[str]:
-    """Where an address is still the reserved one, and the line: what whoever publishes fills in."""
+    """Return file and line of each reserved address, to be replaced before a release."""
     return [
         f"{name}:{number}: {line.strip()}"
         for name in ADDRESSES
@@ -126,7 +126,7 @@ def require_addresses() -> None:
 
 
 def build(source: Path, target: Path) -> tuple[Path, Path]:
-    """The source archive, and the wheel that is built from it alone."""
+    """Build the source archive, and the wheel from it alone."""
     target.mkdir(exist_ok=True)
     archive = target / built(source, "build_sdist", target)
     with tempfile.TemporaryDirectory() as folder:
@@ -137,7 +137,7 @@ def build(source: Path, target: Path) -> tuple[Path, Path]:
 
 
 def built(source: Path, what: str, target: Path) -> str:
-    """The name of what setuptools builds of a folder."""
+    """Run a build step of setuptools in a folder; return the name of its file."""
     code = "import sys, setuptools.build_meta as b; sys.stderr.write('\\n' + getattr(b, sys.argv[1])(sys.argv[2]))"
     done = subprocess.run([sys.executable, "-c", code, what, str(target)], cwd=source, capture_output=True, text=True)
     if done.returncode:
@@ -146,18 +146,18 @@ def built(source: Path, what: str, target: Path) -> str:
 
 
 def archive_complaints(archive: Path) -> Iterator[str]:
-    """What a source archive lacks."""
+    """Yield the files that a source archive lacks."""
     with tarfile.open(archive) as file:
         held = {name.partition("/")[2] for name in file.getnames()}
     yield from (f"{archive.name} lacks {name}" for name in NEEDED if name not in held)
 
 
 def wheel_complaints(wheel: Path, version: str) -> Iterator[str]:
-    """What is wrong with a wheel's files and its metadata: as ``twine check``, and that links lead somewhere."""
+    """Yield defects of a wheel's files and metadata: as ``twine check``, and links without a target."""
     with zipfile.ZipFile(wheel) as file:
         held = set(file.namelist())
         (name,) = (each for each in held if each.endswith(".dist-info/METADATA"))
-        told = message_from_bytes(file.read(name))
+        metadata = message_from_bytes(file.read(name))
     source = ROOT / "src"
     own = [
         path.relative_to(source).as_posix()
@@ -166,13 +166,13 @@ def wheel_complaints(wheel: Path, version: str) -> Iterator[str]:
     ]
     yield from (f"{wheel.name} lacks {name}" for name in (*PACKAGED, *own) if name not in held)
     yield from (f"{wheel.name} holds {name}" for name in sorted(held) if name.startswith("tests/"))
-    text = str(told.get_payload())
+    text = str(metadata.get_payload())
     for field in ("Name", "Summary", "Author-email", "License-Expression", "Requires-Python", "Project-URL"):
-        if not told[field]:
+        if not metadata[field]:
             yield f"the metadata has no {field}"
-    if told["Version"] != version:
-        yield f"the metadata has version {told['Version']}"
-    if told["Description-Content-Type"] != "text/markdown" or "# hrsynth" not in text:
+    if metadata["Version"] != version:
+        yield f"the metadata has version {metadata['Version']}"
+    if metadata["Description-Content-Type"] != "text/markdown" or "# hrsynth" not in text:
         yield "the metadata has no long description in Markdown"
     yield from (
         f"the long description has a link that leads nowhere: {link}"
@@ -182,8 +182,7 @@ def wheel_complaints(wheel: Path, version: str) -> Iterator[str]:
 
 
 def tried(wheel: Path, version: str) -> None:
-    """Raise ``Refused`` where the wheel, installed in an environment of its own with the packages of this one, does not
-    answer."""
+    """Raise ``Refused`` if the wheel, installed in a new environment with the packages of this one, does not run."""
     with tempfile.TemporaryDirectory() as folder:
         here = Path(folder) / "env"
         venv.create(here, with_pip=False)
@@ -193,8 +192,8 @@ def tried(wheel: Path, version: str) -> None:
         packages = [each for each in sys.path if each.endswith("site-packages")]
         (site / "here.pth").write_text("\n".join(packages), encoding="utf-8")
         environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-        asked = {f"hrsynth {version}": ["--version"], "controllable": ["derive", "quattro", "--observe", "1,4"]}
-        for expected, command in asked.items():
+        commands = {f"hrsynth {version}": ["--version"], "controllable": ["derive", "quattro", "--observe", "1,4"]}
+        for expected, command in commands.items():
             code = (
                 "import sys; sys.path.insert(0, sys.argv.pop(1)); import hrsynth, hrsynth.cli as cli; "
                 "assert hrsynth.__file__.startswith(sys.path[0]), hrsynth.__file__; cli.main()"
@@ -211,7 +210,7 @@ def tried(wheel: Path, version: str) -> None:
 
 
 def git(*arguments: str) -> str:
-    """What git says."""
+    """Run git and return its output."""
     done = subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, text=True)
     if done.returncode:
         raise Refused(f"git {arguments[0]}: {done.stderr.strip()}")

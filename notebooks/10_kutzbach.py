@@ -1,9 +1,9 @@
 # %% [markdown]
-# # 10. Kutzbach says −2, and it moves
+# # 10. Kutzbach gives −2, and it moves
 #
-# Count the links, count the joints, subtract: Kutzbach's formula gives the freedoms of a mechanism in no time. It is
-# wrong for most robots in these notebooks, and most beautifully so for the linkages of this one: they should be
-# stiffer than a frame, yet they move.
+# Kutzbach's formula gives the mobility of a mechanism from the numbers of its links and joints. It is wrong for most
+# robots in these notebooks, and most clearly for the linkages of this one: by the formula they are rigid, yet they
+# move.
 
 # %%
 import tempfile
@@ -22,10 +22,12 @@ plt.style.use("hrsynth.present.style")
 # %% [markdown]
 # ## Bennett, 1903
 #
-# Four links in a ring, four hinges, no two hinge axes parallel, no two meeting. In space a link that is not the base
-# has six freedoms, and a hinge takes five of them: 6 · 3 − 5 · 4 = −2. G. T. Bennett found that it moves all the same
-# if opposite links are equal and sin α / a = sin β / b, where a and b are the lengths of the links (distances between
-# neighbouring axes) and α and β their twists (angles between them).
+#
+# Four links in a ring, four revolute joints, no two axes parallel or meeting. In space a link that is not the base has
+# six dof, and a revolute joint removes five of them: 6 · 3 − 5 · 4 = −2.
+#
+# G. T. Bennett found that it moves all the same if opposite links are equal and sin α / a = sin β / b. Here a and b are
+# the lengths of the links (distances between neighbouring axes), and α and β their twists (angles between these axes).
 
 # %%
 linkage = bennett()
@@ -36,12 +38,12 @@ assert [row.rows for row in checked.redundant] == [3]
 checked
 
 # %% [markdown]
-# *Mobility 1*. The last line says how that can be: three of the constraints of the loop repeat others, and −2 + 3 = 1.
-# They are counted by the rank of the loop's Jacobian, with its gap, at twenty configurations, so this is no accident
-# of one pose. The loop is named after the joint at which it is cut.
+# *Mobility 1*. The last line explains it: three constraints of the loop are redundant, and −2 + 3 = 1. They are counted
+# by the rank of the loop Jacobian, with its rank gap. The rank is the same at twenty configurations. The loop is named
+# after its loop closure, the joint at which it is cut.
 #
-# Denavit and Hartenberg's formulas are independent of the program. They say that the ring closes for every angle of
-# one hinge, and that tan θ₁/2 · tan θ₂/2 is constant:
+# The formulas of Denavit and Hartenberg are independent of the program. By them the ring closes for every angle of one
+# joint, and tan θ₁/2 · tan θ₂/2 is constant:
 
 # %%
 twists, start = linkage.twists, linkage.regular(np.random.default_rng(0))
@@ -59,8 +61,8 @@ assert abs(abs(products[0]) - abs(constant)) < 1e-9
 # %% [markdown]
 # ## Seven of a kind
 #
-# Others are known; Goldberg's and Myard's are put together from Bennett's. Kutzbach gives n − 6 for a single loop of n
-# hinges; each of these has one freedom, and so 7 − n redundant constraints:
+# Others are known; Goldberg's and Myard's are combined from Bennett's. Kutzbach gives n − 6 for a single loop of n
+# revolute joints. Each of these has mobility 1, and so 7 − n redundant constraints:
 
 # %%
 folder = Path(tempfile.mkdtemp())
@@ -76,12 +78,13 @@ for name, make in LINKAGES.items():
 
 # %% [markdown]
 # The loop above saved them as robot files. `python -m hrsynth.families FOLDER bennett schatz` does so from the shell.
-# Schatz's is at work in the Turbula mixer.
+# Schatz's linkage drives the Turbula mixer.
 #
-# With one hinge driven and held, a ring has a few closings. These are the assembly modes of the real robot. Written in
-# dual quaternions, they are among the four zeros of a determinant, and all four are enclosed. Two of them are real: the
-# pose itself, and one at which all legs *fit*. There is no third closing. That the second is one is not proved: a ring
-# with a redundant constraint meets more equations than it has unknowns, and a fit to 1e-13 may still be a miss:
+# With one actuated and fixed joint, a ring has a few closed configurations: the assembly modes of the real robot. In
+# dual quaternions they are among the four zeros of a determinant, and all four are enclosed. Two of them are real: the
+# pose itself, and an *unproved match*, at which all legs close numerically. There is no third closed configuration. The
+# second one is not proved. A ring with a redundant constraint satisfies more equations than it has unknowns, and a
+# residual of 1e-13 does not prove a solution:
 
 # %%
 ring = hrsynth.modes(hrsynth.load(folder / "plane_symmetric_bricard.urdf"), real=True)
@@ -89,10 +92,10 @@ print(ring)
 assert len(ring.modes) == 2
 
 # %% [markdown]
-# ## How special is it?
+# ## How sensitive is the condition?
 #
-# Bennett's condition is an equation. If it is missed by a little, the ring need not close at all: it has two unknowns
-# too few for its equations. Here is by how much it stays open where least squares end, if one twist is wrong:
+# Bennett's condition is an equation. With a small error in it, the ring need not close at all: it has two unknowns less
+# than equations. Here is the closure residual of a least-squares solution if one twist is wrong:
 
 # %%
 from scipy.optimize import least_squares
@@ -101,18 +104,18 @@ for error in np.radians([0.01, 0.1, 1.0]):
     wrong = bennett()
     wrong = type(wrong)(wrong.lengths, wrong.twists + [error, 0, 0, 0], wrong.offsets)
     best = least_squares(lambda angles, ring=wrong: (ring.frames(angles)[-1] - np.eye(4))[:3].ravel(), start)
-    print(f"a twist wrong by {np.degrees(error):4.2f}°: open by {np.linalg.norm(best.fun):.1e}")
+    print(f"twist wrong by {np.degrees(error):4.2f}°: closure residual {np.linalg.norm(best.fun):.1e}")
     assert np.linalg.norm(best.fun) > 0.2 * error
 
 # %% [markdown]
-# No file holds such numbers exactly. Robots written with ten decimals miss the condition by 1e-10, and are still meant
-# to move. That is why no rank is printed without its gap: the ratio of the smallest singular value that counts to the
-# largest that does not. Near the limit the program refuses to answer.
+# No file contains such numbers exactly. A robot written with ten decimals has an error of 1e-10 in the condition, and
+# is still a robot that moves. So every printed rank has its rank gap: the ratio of the smallest singular value that
+# counts to the largest that does not. Near the limit the program gives no result.
 #
-# ## Motors held, and it moves
+# ## A motion with fixed motors
 #
-# The same thing happens to parallel robots, and there it is dangerous. Hold all motors of this 3-RP̲R: Kutzbach's count
-# says rigid. But its platform is as large as its base and turned as it is, so its legs are parallel and equal. Three
+# The same happens with parallel robots, and there it is dangerous. Fix all motors of this 3-RP̲R: by Kutzbach's formula
+# it is rigid. But its platform has the size and orientation of its base, so its legs are parallel and equal, like three
 # equal cranks:
 
 # %%
@@ -123,30 +126,33 @@ assert len(found.modes) == 2
 found
 
 # %% [markdown]
-# This is a *self-motion*: a curve of assembly modes. The program followed it in small steps, closing the loops after
-# each, until it came back to the start; its length is that of the circle, but for the chords. A self-motion is *found*
-# and never proved, because samples of a curve prove nothing. The other two modes lie on no self-motion: there the
-# platform is turned.
+# This is a *self-motion*: a curve of assembly modes. The program followed it in small steps, with closed loops after
+# each, until it returned to the start. Its length is that of the circle, up to the chords. A self-motion is *found* and
+# never proved, because samples of a curve prove nothing. The other two modes lie on no self-motion: there the platform
+# is rotated.
 
 # %%
 (motion,) = found.self_motions
 print(f"length {motion.shift:.4f} m, circle {2 * np.pi * np.hypot(0.12, 0.3):.4f} m")
 assert 0.999 < motion.shift / (2 * np.pi * np.hypot(0.12, 0.3)) < 1
-places = np.array([each["platform"][:2, 3] for each in motion.way])
-figure, place = plt.subplots(figsize=(4, 4))
-place.plot(*places.T, ".", label="platform, motors held")
-place.plot(*np.array([mode.bodies["platform"][:2, 3] for mode in found.modes]).T, "x", label="modes on no self-motion")
-place.set_aspect("equal")
-place.legend()
+positions = np.array([each["platform"][:2, 3] for each in motion.way])
+figure, axes = plt.subplots(figsize=(4, 4))
+axes.plot(*positions.T, ".", label="platform, motors fixed")
+axes.plot(*np.array([mode.bodies["platform"][:2, 3] for mode in found.modes]).T, "x", label="modes on no self-motion")
+axes.set_aspect("equal")
+axes.legend()
 plt.show()
 
 # %% [markdown]
-# A machine with that geometry is loose only in this orientation of its platform. Worse are robots that move like this
-# at *every* pose (*architecturally singular*, O. Ma and J. Angeles, 1992). A Gough-Stewart platform whose base and
-# platform are plane and similar is one if its six joints lie on a conic. Let (x, y) be a base point and
-# t + s R (x, y, 0) the platform's. Each Plücker coordinate of the leg's line is then a sum of multiples of 1, x, y,
-# x², xy, y², the same ones for all legs. On a conic these six are dependent, hence the six lines as well. Similar
-# hexagons with corners anywhere are not enough. The smallest singular value of the six lines, over random poses:
+#
+# A robot with that geometry has a self-motion only in this orientation of its platform. Worse are robots with a
+# self-motion at *every* pose (*architecturally singular*, O. Ma and J. Angeles, 1992).
+#
+# A Gough-Stewart platform with plane and similar base and platform is one if its six joints lie on a conic. Let (x, y)
+# be a base point and t + s R (x, y, 0) the platform's. Each Plücker coordinate of the leg's line is then a linear
+# combination of 1, x, y, x², xy, y², with the same coefficients for all legs. On a conic these six are dependent, hence
+# the six lines as well. Similar hexagons with corners anywhere are not enough. The smallest singular value of the six
+# lines, over random poses:
 
 # %%
 rng = np.random.default_rng(1)
@@ -174,7 +180,7 @@ for name, base in bases.items():
 
 # %% [markdown]
 # Two similar hexagons on circles have 20° (base) and 40° (platform) as half the angle between paired joints. With all
-# six motors held, the platform is loose. A single pose shows it here, the theorem all of them:
+# six motors fixed, the platform has a self-motion. The result shows it for one pose, the theorem for all:
 
 # %%
 similar = hrsynth.modes(gough_stewart(base_half=np.radians(20), platform_half=np.radians(40)), real=True)
@@ -184,31 +190,31 @@ assert len(similar.self_motions) == 1
 # %% [markdown]
 # ## Exercises
 #
-# 1. Sarrus's linkage (1853) was the first to guide along a straight line by hinges alone: `link_2`, between the two
-#    triples of parallel axes, against `link_5`. Show it by samples.
+# 1. Sarrus's linkage (1853) was the first straight-line guide with revolute joints only: `link_2`, between the two
+#    triples of parallel axes, against `link_5`. Show it with samples.
 # 2. Make the platform of the 3-RP̲R one percent smaller than its base. What happens to the self-motion?
-# 3. A five-bar, both distal links watched: each direction that is held leaves the tip a circle. Where does `singular`
-#    say that the controller loses a freedom, and when is that a self-motion?
+# 3. A five-bar with both distal links observed: a fixed direction leaves a circle as locus of the tip. At which poses
+#    is a platform dof unobserved by `singularities`, and when is that a self-motion?
 
 # %% [markdown]
 # ## Solutions
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
-# 1. the orientation of one link relative to the other is the same at all configurations, its positions lie on a line
-setting = hrsynth.observe(hrsynth.load(folder / "sarrus.urdf"))
-poses = np.array([np.linalg.inv(at.pose("link_5")) @ at.pose("link_2") for at in setting.configurations])
-print("largest turn", np.abs(poses[:, :3, :3] - poses[0, :3, :3]).max().round(12))
+# 1. the relative orientation of the links is the same at all configurations, the positions lie on a line
+setup = hrsynth.observe(hrsynth.load(folder / "sarrus.urdf"))
+poses = np.array([np.linalg.inv(at.pose("link_5")) @ at.pose("link_2") for at in setup.configurations])
+print("largest rotation", np.abs(poses[:, :3, :3] - poses[0, :3, :3]).max().round(12))
 print("extent along and across the line", np.linalg.svd(poses[:, :3, 3] - poses[:, :3, 3].mean(0))[1].round(12))
 assert np.abs(poses[:, :3, :3] - poses[0, :3, :3]).max() < 1e-9
 assert np.linalg.svd(poses[:, :3, 3] - poses[:, :3, 3].mean(0))[1][1] < 1e-9
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
-# 2. it breaks up into single modes; as the legs' lines meet in a point, far away, the pose itself is a singular one
+# 2. only isolated modes remain; the legs' lines meet in a distant point, so the pose itself is singular
 smaller = tuple((0.99 * radius, angle) for radius, angle in BASE)
 single = hrsynth.modes(three_rpr(motor=2, base=BASE, platform=smaller, home=(0.12, 0.3, 0.0)), real=True)
 print(single)
 assert not single.self_motions
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
-# 3. where the proximal links are parallel: there the two circles touch, and if these links are equal too, they are one
+# 3. where the proximal links are parallel: there the two circles touch; if these links are also equal, they coincide
 print(hrsynth.singularities(hrsynth.load("rrrrr_m1"), points=100).words)

@@ -1,8 +1,8 @@
 # %% [markdown]
 # # 12. Why three corners do not converge
 #
-# A camera that flies freely has six freedoms, and three image points give six numbers. So three corners should be
-# enough for servoing. They are not: this notebook shows two reasons, and why a fourth corner removes both.
+# A free camera has six dof, and three image points give six numbers. So three corners should be enough for servoing.
+# They are not: this notebook shows two reasons, and why a fourth corner removes both.
 
 # %%
 import tempfile
@@ -24,29 +24,29 @@ file.write_text(FREE)
 CORNERS = np.array([[0.3, 0, 0], [-0.15, 0.25, 0], [-0.15, -0.25, 0]])
 
 
-def seeing(corners):
-    """The free camera, and the corners that it sees."""
+def observe_corners(corners):
+    """The free camera, with the corners as observed points."""
     return hrsynth.observe(
-        hrsynth.load(file), camera="eye=camera", sensor=[f"point:world@{x},{y},{z}" for x, y, z in corners]
+        hrsynth.load(file), camera="cam=camera", sensor=[f"point:world@{x},{y},{z}" for x, y, z in corners]
     )
 
 
-three = seeing(CORNERS)
+three = observe_corners(CORNERS)
 print(hrsynth.derive(three))
 
 # %% [markdown]
-# The hidden robot has three legs, from the camera to the corners, each with a driven U: where a corner is in the image
-# is where its leg points. In general three such legs hold the camera, but not everywhere.
+# The hidden robot has three legs, from the camera to the corners, each with an actuated U: the image point of a corner
+# is the direction of its leg. In general three such legs determine the pose of the camera, but not everywhere.
 #
 # ## The danger cylinder
 #
-# The interaction matrix of a point has two rows (page *servo*); three points give a square matrix.
-# Its determinant vanishes where the camera's centre lies on the circular cylinder over the circle through the corners.
+# The interaction matrix of a point has two rows; three points give a square matrix. Its determinant vanishes if the
+# camera centre is on the circular cylinder over the circle through the corners.
 
 
 # %%
 def image(C, R, corners):
-    """x, y and the depth Z of the corners: the camera's centre is C, R takes its axes to those of the world."""
+    """x, y and the depth Z of the corners: the camera centre is C, R rotates camera axes to world axes."""
     local = (corners - C) @ R
     return local[:, 0] / local[:, 2], local[:, 1] / local[:, 2], local[:, 2]
 
@@ -67,36 +67,36 @@ middle = np.array([0.3 - radius, 0, 0])  # by symmetry
 print("radius", radius.round(4), "m; from the middle to the corners", np.linalg.norm(CORNERS - middle, axis=1).round(4))
 
 grid = np.linspace(-0.6, 0.6, 121)
-weakest = np.array(
+smallest = np.array(
     [
         [np.linalg.svd(interaction(np.array([x, y, 0.9]), DOWN, CORNERS), compute_uv=False)[-1] for x in grid]
         for y in grid
     ]
 )
-figure, place = plt.subplots(figsize=(4.5, 4))
-drawn = place.pcolormesh(grid, grid, np.log10(weakest), cmap="viridis")
-figure.colorbar(drawn, label="log10 of the smallest singular value")
+figure, axes = plt.subplots(figsize=(4.5, 4))
+mesh = axes.pcolormesh(grid, grid, np.log10(smallest), cmap="viridis")
+figure.colorbar(mesh, label="log10 of the smallest singular value")
 turn = np.linspace(0, 2 * np.pi, 100)
-place.plot(middle[0] + radius * np.cos(turn), radius * np.sin(turn), "w--", linewidth=1)
-place.plot(*CORNERS[:, :2].T, "wo")
-place.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", title="camera 0.9 m above the corners")
+axes.plot(middle[0] + radius * np.cos(turn), radius * np.sin(turn), "w--", linewidth=1)
+axes.plot(*CORNERS[:, :2].T, "wo")
+axes.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", title="camera 0.9 m above the corners")
 plt.show()
 
 # %% [markdown]
-# The dark ring is the cylinder (dashed; exercise 2 tests it). Which way the camera looks does not matter: a turn
+# The dark ring is the cylinder (dashed; exercise 2 tests it). The orientation of the camera does not matter: a rotation
 # multiplies the determinant by a number that is not zero.
 #
 # ## Four poses, one image
 #
-# Off the cylinder, the image of three corners still does not say where the camera is. With the distances $d_i$ to the
-# corners, and $d_2 = u d_1$, $d_3 = v d_1$, the three sides of the triangle give two quadratic equations in u and v.
-# Their difference is linear in u; eliminating u leaves Grunert's equation (1841), of degree four in v. Each positive
-# solution is a place from which the corners look the same.
+# Off the cylinder, the image of three corners still does not determine the pose of the camera. With the distances $d_i$
+# to the corners, and $d_2 = u d_1$, $d_3 = v d_1$, the three sides of the triangle give two quadratic equations in u
+# and v. Their difference is linear in u; eliminating u leaves Grunert's equation (1841), of degree four in v. Each
+# positive solution is a camera pose with the same image of the corners.
 
 
 # %%
 def four_poses(rays, corners):
-    """All C and R at which the corners are seen along the given rays, in front of the camera."""
+    """All C and R at which the corners lie on the given rays, in front of the camera."""
     a, b, c = (np.linalg.norm(corners[i] - corners[j]) ** 2 for i, j in ((1, 2), (0, 2), (0, 1)))
     cos_a, cos_b, cos_c = (rays[i] @ rays[j] for i, j in ((1, 2), (0, 2), (0, 1)))
     P = np.polynomial.Polynomial
@@ -140,16 +140,16 @@ assert len(poses) == 4
 # %% [markdown]
 # ## Servoing by three corners
 #
-# The loop drives the image to that of the goal. It cannot tell which of the poses it reaches: the image does not show
-# whether a start lies in the basin of the goal or of another pose.
+# The loop drives the image to that of the goal. The image does not determine the pose, nor whether a start lies in the
+# basin of the goal or of another pose.
 
 # %%
 rng = np.random.default_rng(4)
 starts = []
 while len(starts) < 8:
-    place, angles = rng.uniform([-0.6, -0.6, 0.6], [0.6, 0.6, 1.4]), rng.uniform([170, -10, -60], [190, 10, 60])
+    position, angles = rng.uniform([-0.6, -0.6, 0.6], [0.6, 0.6, 1.4]), rng.uniform([170, -10, -60], [190, 10, 60])
     starts.append(
-        f"x={place[0]:.3f},y={place[1]:.3f},z={place[2]:.3f},"
+        f"x={position[0]:.3f},y={position[1]:.3f},z={position[2]:.3f},"
         f"rpy={angles[0]:.0f}deg/{angles[1]:.0f}deg/{angles[2]:.0f}deg"
     )
 by_three = [hrsynth.servo(three, start=start, goal=GOAL) for start in starts]
@@ -158,22 +158,22 @@ for found in by_three:
     nearest = min(np.linalg.norm(C - other) for other, _ in poses)
     print(f"{found.outcome:16}", C.round(3), "nearest of the poses above:", f"{1e3 * nearest:.3g} mm")
     assert nearest < 1e-6
-    assert found.outcome in ("goal", "mode")
+    assert found.outcome == "goal" or "mode" in found.outcome
 
 # %% [markdown]
-# Runs that end in a *mode* reached another of the poses that Grunert's equation lists. The cylinder and the poses
-# belong together: on the cylinder, two of the poses become one.
+# Runs with the outcome *assembly mode* reached another of the poses that Grunert's equation lists. The cylinder and the
+# poses are related: on the cylinder, two of the poses coincide.
 #
 # ## The fourth corner
 #
-# With a fourth corner in their plane, no three on a line, the image determines the pose. Its rows also restore the rank
-# that those of the other three lose on the cylinder. If it is not on their circle this is so everywhere: a camera on
-# the cylinders of all four triples would be above a point of all four circles, and those have none in common. At the
-# place below the rank is full on the circle too, but the smallest singular value is smaller:
+# With a fourth corner in their plane, no three on a line, the image determines the pose. Its rows also restore the full
+# rank on the cylinder. If it is not on their circle, this holds everywhere: a camera on the cylinders of all four
+# triples would be above a point of all four circles, and these have no common point. At the position below the rank is
+# full on the circle too, but the smallest singular value is smaller:
 
 # %%
 square = np.vstack([CORNERS, [[0.15, -0.3, 0]]])
-four = seeing(square)
+four = observe_corners(square)
 for start in starts[:4]:
     by_four = hrsynth.servo(four, start=start, goal=GOAL).outcome
     print(by_four)
@@ -198,13 +198,14 @@ print(
 )
 
 # %% [markdown]
-# Four corners give eight numbers for six freedoms: the loop may also rest where the error is not zero but has no
-# component that a motion could lessen (a *local minimum*). `servo` names it.
+# Four corners give eight numbers for six dof. So the loop can also have an equilibrium with a nonzero error that no
+# motion reduces (a *local minimum*). `servo` names it.
 #
 # ## Exercises
 #
 # 1. How many of the poses at the image of the goal lie inside the danger cylinder, and how many outside?
-# 2. Show on 100 random places on the cylinder, and random turns, that the matrix is singular, and on none off it.
+# 2. Show that the matrix is singular at 100 random positions on the cylinder, with random orientations, and at none off
+#    it.
 # 3. With three corners, does it help to know the depths at the goal only (`depth="desired"`)?
 
 # %% [markdown]
@@ -215,7 +216,7 @@ print(
 print([("inside" if np.linalg.norm((C - middle)[:2]) < radius else "outside") for C, _ in poses])
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
-# 2. the turn changes the rows of each point by a regular matrix
+# 2. the rotation multiplies the rows of each point by a regular matrix
 least = {}
 for name, far in (("on", 1.0), ("off", 1.3)):
     values = []
@@ -233,7 +234,7 @@ assert least["off"][0] > 1e-3
 print("on:", f"at most {least['on'][1]:.1e};", "off:", f"at least {least['off'][0]:.1e}")
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
-# 3. of these eight starts more reach the goal; but the other poses remain, and one run still ends at one
+# 3. of these eight starts more reach the goal; but the other poses remain, and one run still converges to one
 by_depth = [hrsynth.servo(three, start=start, goal=GOAL, depth="desired").outcome for start in starts]
 reached = [[found.outcome for found in by_three].count("goal"), by_depth.count("goal")]
 print("goal reached with the depths of each image:", reached[0], "of 8; with those at the goal:", reached[1], "of 8")

@@ -1,9 +1,9 @@
 # %% [markdown]
 # # 13. By hand: from the edges in the image to the motion
 #
-# The other notebooks let the program compute. This one does the steps of a leg-observing controller with a pencil and
-# NumPy, for the Quattro with a rigid platform: the interaction matrix of one leg, the direction from the edges of a
-# rod in the image, and the loop. Then it breaks each of them: a wrong model, a wrong camera, a gain that is too large.
+# The other notebooks let the program compute. This one does the steps of a leg-observing controller by hand with NumPy,
+# for the Quattro with a rigid platform. They are the interaction matrix of one leg, the direction from the edges of a
+# rod in the image, and the loop. Then each gets an error: a wrong model, a wrong camera, a gain that is too large.
 
 # %%
 import matplotlib.pyplot as plt
@@ -22,12 +22,12 @@ UP = np.array([0.0, 0.0, 1.0])
 # %% [markdown]
 # ## One leg
 #
-# The platform only translates, P is its point. Leg i starts at A = 0.296 OUT, its crank points along
-# v = cos q OUT + sin q UP, and its rods, of direction u, end at C = P + 0.102 OUT:
+# The platform only translates; P is its reference point. Leg i begins at A = 0.296 OUT. Its crank has the direction v =
+# cos q OUT + sin q UP, and its rods, of direction u, end at C = P + 0.102 OUT:
 #
 # $$ C = A + l_1 v + l_2 u $$
 #
-# |u| = 1 gives one equation for q (IROS (3)); of its two solutions the one with the elbow outside is the robot's.
+# |u| = 1 gives one equation for q (IROS (3)); its solution with the elbow outside is the robot's working mode.
 
 
 # %%
@@ -65,12 +65,12 @@ print("u of leg 1:", direction(P, 0).round(6))
 def interaction(P, i, crank=CRANK, rod=ROD):
     """Mᵀ of leg i, (3, 3)."""
     q, u = crank_angle(P, i, crank, rod), direction(P, i, crank, rod)
-    across = -np.sin(q) * OUT[i] + np.cos(q) * UP
-    return (np.eye(3) - np.outer(across, u) / (u @ across)) / rod
+    normal = -np.sin(q) * OUT[i] + np.cos(q) * UP
+    return (np.eye(3) - np.outer(normal, u) / (u @ normal)) / rod
 
 
 def differences(P, i, step=1e-6):
-    """The same by central differences."""
+    """Mᵀ of leg i by central differences."""
     return np.column_stack([(direction(P + step * e, i) - direction(P - step * e, i)) / (2 * step) for e in np.eye(3)])
 
 
@@ -82,32 +82,33 @@ print("of legs 1 and 3 together:  ", np.linalg.svd(np.vstack([M, interaction(P, 
 assert np.linalg.svd(M, compute_uv=False)[2] < 1e-12
 
 # %% [markdown]
-# One leg shows two of the three freedoms: v⊥ is in the kernel, the tangent of the circle of notebook 1. Two legs show
-# all, unless their tangents are parallel (Type 2). The formula itself fails where u · v⊥ = 0: crank and rods are in
-# line, the leg is stretched or folded (Type 1). The papers print it with the other sign before v⊥ uᵀ (IROS (8), (12)).
-# With that sign u · u̇ is not zero:
+# One leg observes two of the three dof: v⊥, the tangent of the circle of notebook 1, is in the kernel. Two legs observe
+# all, unless their tangents are parallel (Type 2). The formula itself fails at u · v⊥ = 0: crank and rods are in line,
+# the leg is stretched or folded (Type 1). The papers print it with the other sign before v⊥ uᵀ (IROS (8), (12)). With
+# that sign u · u̇ is not zero:
 
 # %%
 q, u = crank_angle(P, 0), direction(P, 0)
-across = -np.sin(q) * OUT[0] + np.cos(q) * UP
-printed = (np.eye(3) + np.outer(across, u) / (u @ across)) / ROD
+normal = -np.sin(q) * OUT[0] + np.cos(q) * UP
+printed = (np.eye(3) + np.outer(normal, u) / (u @ normal)) / ROD
 print("u · Mᵀ, by hand:", (u @ M).round(12), " as printed:", (u @ printed).round(3))
 assert np.abs(u @ M).max() < 1e-12 < np.abs(u @ printed).max()
 
 # %% [markdown]
 # ## From the image to a direction
 #
-# A camera sees a rod as a cylinder of radius R. In its image the rod has two edges, lines, and each edge spans a plane
-# with the camera's centre. Let h be the unit normal of the plane through the centre and the axis, and h the axis's
-# distance. MMT (3), (4) give the normals of the two planes, and both planes hold the direction (MMT (5)):
+# For a camera, a rod is a cylinder of radius R. In the image it has two straight edges, and each edge spans a plane
+# with the camera centre. Let $\mathbf{h}$ be the unit normal of the plane through the camera centre and the axis, and h
+# the distance of the axis. MMT (3), (4) give the normals of the two planes, and both planes contain the direction (MMT
+# (5)):
 #
-# $$ n_{1,2} = \mp \cos\theta\, h - \sin\theta\, u \times h, \quad \sin\theta = R/h, \quad u = \pm\, n_1 \times n_2 /
-# \|n_1 \times n_2\| $$
+# $$ n_{1,2} = \mp \cos\theta\, \mathbf{h} - \sin\theta\, u \times \mathbf{h}, \quad \sin\theta = R/h, \quad u = \pm\,
+# n_1 \times n_2 / \|n_1 \times n_2\| $$
 
 
 # %%
 def edges(point, u, radius):
-    """Normals of the planes through the camera's centre (the origin) that touch a cylinder."""
+    """Normals of the planes through the camera centre (the origin) that touch a cylinder."""
     moment = np.cross(point, u)
     distance = np.linalg.norm(moment)
     h, sine = moment / distance, radius / distance
@@ -117,7 +118,7 @@ def edges(point, u, radius):
 
 point, radius = np.array([0.2, -0.1, 0.9]), 0.01
 n = edges(point, u, radius)
-for normal in n:  # a plane that touches the cylinder is as far from its axis as the radius says, and parallel to it
+for normal in n:  # a plane that touches the cylinder is parallel to its axis, at a distance of the radius
     assert abs(abs(normal @ point) - radius) < 1e-12
     assert abs(normal @ u) < 1e-12
 found = np.cross(*n) / np.linalg.norm(np.cross(*n))
@@ -125,8 +126,9 @@ print("direction from the edges:", found.round(6), " sign:", np.sign(found @ u))
 assert np.allclose(found * np.sign(found @ u), u)
 
 # %% [markdown]
-# Two things are to be seen. The sign is not in the image; a controller keeps that of the last image. And the planes
-# are almost parallel, 2 θ apart, so the cross product is small. An error of half a pixel in each edge:
+# Two observations. The image does not contain the sign; a controller keeps that of the last image. And the planes are
+# almost parallel, with an angle of 2 θ, so the cross product is small. The effect of an error of half a pixel in each
+# edge:
 
 # %%
 rng = np.random.default_rng(0)
@@ -135,21 +137,21 @@ plane = np.cross(point, u) / np.linalg.norm(np.cross(point, u))
 errors = []
 for _ in range(2000):
     noisy = [normal + pixel * rng.normal(size=3) for normal in n]
-    seen = np.cross(*noisy)
-    seen *= np.sign(seen @ u) / np.linalg.norm(seen)
-    errors.append([(seen - u) @ plane, (seen - u) @ np.cross(plane, u)])
+    estimate = np.cross(*noisy)
+    estimate *= np.sign(estimate @ u) / np.linalg.norm(estimate)
+    errors.append([(estimate - u) @ plane, (estimate - u) @ np.cross(plane, u)])
 across_image, along_view = np.degrees(np.std(errors, axis=0))
 print(f"in the image: {across_image:.2f}°; towards the camera: {along_view:.2f}°")
 assert 0.5 < along_view / across_image * radius / np.linalg.norm(np.cross(point, u)) < 2
 
 # %% [markdown]
-# The direction in the image is known well, the inclination towards the camera badly: by a factor of about h / R. That
-# is why `accuracy` takes an angle of error, and why thick rods near the camera are good rods to watch.
+# The direction in the image is accurate; the inclination towards the camera is less accurate by a factor of about h /
+# R. So `accuracy` takes an angle of error, and thick rods near the camera are good rods to observe.
 #
 # ## The loop
 #
-# e = (u₁ × u₁*, …), and the platform's velocity is −λ L⁺ e with L_iᵀ = −[u_i*]ₓ M_iᵀ (MMT (9)-(11)). In a computer it
-# comes in steps:
+# e = (u₁ × u₁*, …), and the platform's velocity is −λ L⁺ e with L_iᵀ = −[u_i*]ₓ M_iᵀ (MMT (9)-(11)). A computer applies
+# it in steps:
 
 
 # %%
@@ -161,49 +163,49 @@ def skew(w):
 
 
 def loop(start, desired, legs=(0, 2), gain=2.0, step=0.04, time=8.0, crank=CRANK, camera=STRAIGHT):
-    """Places of the platform: the controller has M of a model with this crank, and sees through a turned camera."""
-    P, places = np.array(start, float), [np.array(start, float)]
+    """Positions of the platform: the controller has M of a model with this crank, and a rotated camera."""
+    P, positions = np.array(start, float), [np.array(start, float)]
     for _ in range(int(time / step)):
         e = np.concatenate([np.cross(camera @ direction(P, i), w) for i, w in zip(legs, desired, strict=True)])
         L = np.vstack([-skew(w) @ interaction(P, i, crank) for i, w in zip(legs, desired, strict=True)])
         P = P - step * gain * np.linalg.pinv(L, rcond=1e-6) @ e
-        places.append(P)
-    return np.array(places)
+        positions.append(P)
+    return np.array(positions)
 
 
 START, GOAL = np.array([0.1, 0.04, -0.8]), np.array([0.0, -0.15, -0.7])
 taught = [direction(GOAL, i) for i in (0, 2)]
 run = loop(START, taught)
-print("ends", f"{1e3 * np.linalg.norm(run[-1] - GOAL):.1e} mm from the goal")
+print("final position", f"{1e3 * np.linalg.norm(run[-1] - GOAL):.1e} mm from the goal")
 assert np.linalg.norm(run[-1] - GOAL) < 1e-6
 
 # %% [markdown]
 # ### A wrong model
 #
-# The cranks are 5 % longer than the controller believes. If the desired directions were *taught* (measured with the
-# robot at the goal), only M is wrong, and the loop still ends at the goal, by another way. If they were *computed* with
-# the wrong model, it ends elsewhere, with no error left to see:
+# The cranks are 5 % longer than in the controller's model. If the desired directions were *taught* (measured with the
+# robot at the goal), only M is wrong. Then the loop still converges to the goal, on another path. If they were
+# *computed* with the wrong model, it converges to another pose, with zero error:
 
 # %%
 computed = [direction(GOAL, i, crank=0.95 * CRANK) for i in (0, 2)]
 for name, desired in (("taught", taught), ("computed", computed)):
-    places = loop(START, desired, crank=0.95 * CRANK)
-    print(f"{name:9} ends {1e3 * np.linalg.norm(places[-1] - GOAL):6.2f} mm from the goal")
-    assert (np.linalg.norm(places[-1] - GOAL) < 1e-5) == (name == "taught")
+    positions = loop(START, desired, crank=0.95 * CRANK)
+    print(f"{name:9} final position {1e3 * np.linalg.norm(positions[-1] - GOAL):6.2f} mm from the goal")
+    assert (np.linalg.norm(positions[-1] - GOAL) < 1e-5) == (name == "taught")
 
 # %% [markdown]
 # ### A wrong camera
 #
-# The camera is turned by two degrees against its calibration. Taught directions are seen through the same camera, so
-# again only the way changes:
+# The camera is rotated by two degrees from its calibration. Taught directions are measured with the same camera, so
+# again only the path changes:
 
 # %%
 turn = np.radians(2.0)
 camera = np.array([[1, 0, 0], [0, np.cos(turn), -np.sin(turn)], [0, np.sin(turn), np.cos(turn)]])
 for name, desired in (("taught", [camera @ w for w in taught]), ("computed", taught)):
-    places = loop(START, desired, camera=camera)
-    print(f"{name:9} ends {1e3 * np.linalg.norm(places[-1] - GOAL):6.2f} mm from the goal")
-    assert (np.linalg.norm(places[-1] - GOAL) < 1e-5) == (name == "taught")
+    positions = loop(START, desired, camera=camera)
+    print(f"{name:9} final position {1e3 * np.linalg.norm(positions[-1] - GOAL):6.2f} mm from the goal")
+    assert (np.linalg.norm(positions[-1] - GOAL) < 1e-5) == (name == "taught")
 
 # %% [markdown]
 # ### Gain and sampling
@@ -213,37 +215,37 @@ for name, desired in (("taught", [camera @ w for w in taught]), ("computed", tau
 
 # %%
 near = GOAL + [0.002, -0.001, 0.002]
-figure, place = plt.subplots(figsize=(6, 3.2))
-ends = {}
+figure, axes = plt.subplots(figsize=(6, 3.2))
+distances = {}
 for product in (0.2, 1.0, 1.8, 2.1):
-    ends[product] = 1e3 * np.linalg.norm(loop(near, taught, gain=product / 0.04, time=1.0) - GOAL, axis=1)
-    place.semilogy(ends[product], label=f"λh = {product}")
-place.set(xlabel="step", ylabel="distance to the goal (mm)")
-place.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    distances[product] = 1e3 * np.linalg.norm(loop(near, taught, gain=product / 0.04, time=1.0) - GOAL, axis=1)
+    axes.semilogy(distances[product], label=f"λh = {product}")
+axes.set(xlabel="step", ylabel="distance to the goal (mm)")
+axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
 plt.show()
-assert ends[1.0][-1] < ends[1.8][-1] < ends[1.8][0] < ends[2.1][-1]
+assert distances[1.0][-1] < distances[1.8][-1] < distances[1.8][0] < distances[2.1][-1]
 
 # %% [markdown]
-# ## Rails and slides
+# ## Rails and prismatic joints
 #
-# Many linear Deltas have parallel rails (MMT 4.3 names UraneSX and I4L). Their rods point the same way wherever the
-# platform is along the rails, so directions cannot show that freedom, with any number of legs. Rails in three
-# directions do better:
+# Many linear Deltas have parallel rails (MMT 4.3 names UraneSX and I4L). The directions of their rods do not depend on
+# the position along the rails, so no number of legs observes that dof. With rails in three directions all dof are
+# observed:
 
 # %%
 for name in ("uranesx", "i4l", "linear_delta", "orthoglide"):
     verdict = hrsynth.derive(name).verdict
-    print(f"{name:13}{verdict.verdict:24}", *(f"loses {freedom.name}" for freedom in verdict.unobserved))
+    print(f"{name:13}{verdict.verdict:24}", *(f"unobserved: {twist.name}" for twist in verdict.unobserved))
     assert (verdict.verdict == "controllable") == (name in ("linear_delta", "orthoglide"))
 
 # %% [markdown]
-# The passive slides of a hidden robot are ideal: they may have any length, and negative ones. A 3-RPR with its three
-# directions held has at most two modes. Here are the lengths of its slides at both:
+# The passive prismatic joints of a hidden robot are ideal: they can have any length, also a negative one. A 3-RPR with
+# its three directions fixed has at most two modes. Here are the lengths of its prismatic joints at both:
 
 # %%
 planar = three_rpr(motor=2, base=BASES, platform=((0.15, 0.3), (0.1, 2.0), (0.2, 5.5)))
-held = hrsynth.modes(planar, at="x=-0.01,y=0.23,phi=104deg")
-assert len(held.modes) == held.found.complex == 2
+fixed = hrsynth.modes(planar, at="x=-0.01,y=0.23,phi=104deg")
+assert len(fixed.modes) == fixed.found.complex == 2
 zero = np.linalg.inv(planar.links["platform"].pose)
 ends = [(planar.joints[f"shoulder_{i}"].point, zero @ [*planar.joints[f"wrist_{i}"].point, 1]) for i in (1, 2, 3)]
 
@@ -253,23 +255,23 @@ def rods(mode):
     return np.array([(mode.bodies["platform"] @ tip)[:3] - base for base, tip in ends])
 
 
-goal = next(mode for mode in held.modes if mode.goal)
+goal = next(mode for mode in fixed.modes if mode.goal)
 pointing = rods(goal) / np.linalg.norm(rods(goal), axis=1)[:, None]
-for mode in held.modes:
+for mode in fixed.modes:
     lengths = np.sum(rods(mode) * pointing, axis=1)
     print(mode.pose, "lengths", lengths.round(3))
     assert (lengths.min() > 0) == mode.goal
 
 # %% [markdown]
-# At the other mode slide 1 has gone through its joint and out on the other side. Its axis still points as at the
-# goal, but no cylinder is built so: a real leg would have to turn around, and the camera would see it point the other
-# way. Give the slides limits in the robot's file, and `modes` says *beyond limits* there.
+# At the other mode prismatic joint 1 has a negative length. Its axis has the direction of the goal, but no real
+# cylinder allows that: a real leg would have to reverse, and so would the measured direction. With joint limits in the
+# robot file, `modes` reports *beyond limits* there.
 #
 # ## Exercises
 #
-# 1. The radius of the rod is known only to 10 %. How wrong is the direction from the edges? And that of the axis's
-#    distance?
-# 2. Derive Mᵀ of a planar RRR leg of which the distal link is watched, and compare it with differences.
+# 1. The radius of the rod is known only to 10 %. How wrong is the direction from the edges? How wrong is the distance
+#    of the axis?
+# 2. Derive Mᵀ of a planar RRR leg with its distal link observed, and compare it with differences.
 # 3. With legs 1 and 2, and with legs 1 and 3: which loop is more sensitive to a wrong model, at the same goal?
 
 # %% [markdown]
@@ -285,14 +287,14 @@ assert abs(radius / sine - true) < 1e-9
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 2. the same steps: C = A + l₁ v(q) + l₂ u, so u̇ = (I − v⊥ uᵀ / (u · v⊥)) Ċ / l₂, of rank one in the plane
-l_1, l_2, anchor = 0.2, 0.3, np.array([0.0, 0.0])
+l_1, l_2, A = 0.2, 0.3, np.array([0.0, 0.0])
 
 
 def planar_direction(C):
-    x, y = C - anchor
+    x, y = C - A
     bend = np.arctan2(y, x) + np.arccos((x * x + y * y + l_1**2 - l_2**2) / (2 * l_1 * np.hypot(x, y)))
     v = np.array([np.cos(bend), np.sin(bend)])
-    return (C - anchor - l_1 * v) / l_2, np.array([-v[1], v[0]])
+    return (C - A - l_1 * v) / l_2, np.array([-v[1], v[0]])
 
 
 C = np.array([0.25, 0.2])

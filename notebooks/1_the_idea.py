@@ -1,15 +1,14 @@
 # %% [markdown]
 # # 1. The idea, on a five-bar
 #
-# A parallel robot is usually controlled by its motors: encoders measure the motor angles, and a model turns them into
-# the pose of the platform. There is another way. A camera watches the robot's thin rods, and the controller turns the
-# motors until every rod points in the wanted *direction*. No motor angle is measured at all.
+# A parallel robot is usually controlled by its motors: encoders measure the motor angles, and a model gives the pose of
+# the platform. There is another way. A camera observes the robot's thin rods, and the controller turns the motors until
+# every rod has its desired *direction*. No motor angle is measured.
 #
-# Which poses can such a controller reach, and where does it fail? The answer of the papers is a change of view: a
-# controller that measures other things moves another robot. That other robot, the *hidden robot*, has motors where
-# the camera looks, and its own assembly modes and singularities. This notebook finds it for the smallest example that
-# shows everything: a planar five-bar. (MMT is Briot et al., *Mechanism and Machine Theory* 106, 2016; see the
-# README.)
+# Which poses can such a controller reach, and where does it fail? The papers answer with a second mechanism, the
+# *hidden robot*: its motor coordinates are the measured values. It has its own assembly modes and singularities, and
+# these limit the controller. This notebook finds it for the smallest example, a planar five-bar. (MMT is Briot et al.,
+# *Mechanism and Machine Theory* 106, 2016; see the README.)
 
 # %%
 import matplotlib.pyplot as plt
@@ -22,11 +21,11 @@ robot = hrsynth.load("rrrrr_m1")
 robot
 
 # %% [markdown]
-# Two cranks turn about fixed points A₁, A₂ and are driven by motors. Two rods are joined to the cranks' ends B₁, B₂
-# and meet in the point C, the platform. All joints are revolute, with parallel axes. The letters `R̲RRRR̲` say this:
-# five revolute joints in a row, the underlined ones driven.
+# Two cranks rotate about fixed points A₁, A₂ and are actuated. Two rods are joined to the cranks' ends B₁, B₂ and meet
+# in the point C, the platform. All joints are revolute, with parallel axes. The notation is `R̲RRRR̲`: five revolute
+# joints in a row, the underlined ones actuated.
 #
-# The camera watches the directions u₁, u₂ of the two rods. At the zero configuration of the file:
+# The camera observes the directions u₁, u₂ of the two rods. At the zero configuration of the file:
 
 # %%
 points = {name: joint.point[:2] for name, joint in robot.joints.items()}
@@ -42,16 +41,16 @@ for i in (0, 1):
 # %% [markdown]
 # ## Where can the platform be?
 #
-# Suppose that only the directions are known. With u₁ held, leg 1 lets its crank turn and nothing more: the rod is
-# carried along without turning. So C = B₁ + l₁ u₁ moves as B₁ does, on a circle, only shifted by the constant vector
-# l₁ u₁. Leg 2 gives another circle. The platform must lie on both:
+# Suppose that only the directions are known. With u₁ fixed, the crank of leg 1 can still rotate; the rod then
+# translates. So C = B₁ + l₁ u₁ moves on a circle like B₁, shifted by the constant vector l₁ u₁. Leg 2 gives another
+# circle. The platform must lie on both:
 
 # %%
 centre = [A[i] + rod[i] * u[i] for i in (0, 1)]
 
 
-def meet(centre, radius):
-    """The points where two circles meet."""
+def intersect(centre, radius):
+    """The points in which two circles intersect."""
     between = centre[1] - centre[0]
     d = np.linalg.norm(between)
     along = (d**2 + radius[0] ** 2 - radius[1] ** 2) / (2 * d)
@@ -61,41 +60,41 @@ def meet(centre, radius):
     return [centre[0] + along * e + sign * across * normal for sign in (1, -1)]
 
 
-poses = meet(centre, crank)
+poses = intersect(centre, crank)
 for pose in poses:
     print(pose.round(6))
 
 
 # %%
-def draw_robot(place, C, colour, label):
+def draw_robot(axes, C, colour, label):
     """The five-bar with its platform at C and its rods in the given directions."""
     for i in (0, 1):
         elbow = C - rod[i] * u[i]
-        place.plot(*np.array([A[i], elbow]).T, color="0.45", lw=4, solid_capstyle="round")
-        place.plot(*np.array([elbow, C]).T, color=colour, lw=2.5, label=label if i == 0 else None)
-    place.plot(*C, "o", color=colour, ms=9)
+        axes.plot(*np.array([A[i], elbow]).T, color="0.45", lw=4, solid_capstyle="round")
+        axes.plot(*np.array([elbow, C]).T, color=colour, lw=2.5, label=label if i == 0 else None)
+    axes.plot(*C, "o", color=colour, ms=9)
 
 
-figure, place = plt.subplots(figsize=(5.5, 5.5))
+figure, axes = plt.subplots(figsize=(5.5, 5.5))
 angle = np.linspace(0, 2 * np.pi, 200)
 for i in (0, 1):
-    place.plot(centre[i][0] + crank[i] * np.cos(angle), centre[i][1] + crank[i] * np.sin(angle), "k:", lw=1)
-draw_robot(place, poses[0], "tab:orange", "one pose")
-draw_robot(place, poses[1], "tab:green", "another, with the same directions")
-place.plot(*np.array(A).T, "ks", ms=8)
-place.set(xlabel="x (m)", ylabel="y (m)", aspect="equal")
-place.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    axes.plot(centre[i][0] + crank[i] * np.cos(angle), centre[i][1] + crank[i] * np.sin(angle), "k:", lw=1)
+draw_robot(axes, poses[0], "tab:orange", "one pose")
+draw_robot(axes, poses[1], "tab:green", "another, with the same directions")
+axes.plot(*np.array(A).T, "ks", ms=8)
+axes.set(xlabel="x (m)", ylabel="y (m)", aspect="equal")
+axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
 plt.show()
 
 # %% [markdown]
-# This is the picture of MMT Fig. 5: two configurations of one five-bar, and in both of them the rods point the same
-# way. The camera cannot tell them apart, however good it is. (The dotted circles are the two circles above.)
+# This is MMT Fig. 5: two configurations of one five-bar with the same directions of the rods. No camera can distinguish
+# them. (The dotted circles are the two circles above.)
 #
 # ## The hidden robot
 #
-# Is there a mechanism whose *motors* set the directions u₁, u₂, and which for given motor angles allows just these
-# two poses? In each leg it must carry the rod on a circle without turning it. A parallelogram does that. Its letter
-# is Π. The rod hangs on the parallelogram by a motor that turns it. `derive` finds this by itself:
+# Is there a mechanism whose *motors* set the directions u₁, u₂, and which for given motor angles has exactly these two
+# poses? In each leg it must move the rod on a circle without rotating it. A parallelogram does that; its letter is Π. A
+# motor joins the rod to the parallelogram. `derive` finds this mechanism:
 
 # %%
 hidden = hrsynth.derive(robot)
@@ -105,12 +104,12 @@ hidden
 hrsynth.draw(hidden)
 
 # %% [markdown]
-# The crank has become part of a passive parallelogram, and the motors sit where the rods begin: `ΠR̲RR̲Π`. The lines
-# below the certificate are the steps of the derivation; notebook 2 takes them one by one.
+# The crank has become part of a passive parallelogram, and the motors are where the rods begin: `ΠR̲RR̲Π`. The output
+# lists the steps of the derivation; notebook 2 takes them one by one.
 #
-# The *certificate* is not part of the derivation. It puts both robots at 20 random poses and compares how the
-# platform's velocity and the rates of the directions depend on each other. If the hidden robot were wrong, the angle
-# between these two linear relations would be far from zero at most of them.
+# The *equivalence check* is not part of the derivation. At 20 random configurations it compares the two robots'
+# velocity relations: the possible pairs of platform twist and rates of the directions. If the hidden robot were wrong,
+# the angle between these two linear spaces would be far from zero at most of them.
 
 # %%
 print(hidden.equivalence)
@@ -137,12 +136,12 @@ hrsynth.draw(found)
 # %% [markdown]
 # ## What a controller does
 #
-# The control law compares each direction with the wanted one and commands the velocity with which the errors would
+# The control law compares each direction with the desired one and commands the velocity with which the errors would
 # decay (MMT 2.3):
 #
 # $$e_i = u_i \times u_{di}, \quad \dot e = L^T t, \quad t = -\lambda L^{T+} e$$
 #
-# Started well below the goal, the robot reaches it:
+# From a start well below the goal, the robot reaches it:
 
 # %%
 goal = "x=0.02,y=0.3"
@@ -151,20 +150,20 @@ print(repr(reaching))
 assert reaching.outcome == "goal"
 
 # %% [markdown]
-# But from a start that is much nearer to the goal it ends far away from it, although both errors go to zero:
+# From a start much nearer to the goal it stops far away from it, although both errors go to zero:
 
 # %%
 run = hrsynth.servo(robot, start="x=0,y=0.345", goal=goal)
 metres, _ = run.from_goal
-print(f"ended: {run.outcome}, mode {run.run_outcome.matched}, {1e3 * metres:.0f} mm from the goal")
-assert run.outcome == "mode"
+print(f"outcome: {run.outcome} {run.run_outcome.matched}, {1e3 * metres:.0f} mm from the goal")
+assert "mode" in run.outcome
 assert metres > 0.3
 hrsynth.draw(run)
 
 # %% [markdown]
-# Why there? Start and goal lie on different sides of a *singularity* of the hidden robot, a place where its two
-# assembly modes meet and where the platform can move a little without changing the directions. `path` proves this for
-# the working modes that it reached, and says which others of the real legs remain open:
+# Why there? Start and goal lie on different sides of a *singularity* of the hidden robot. There its two assembly modes
+# meet, and the platform can move infinitesimally without changing the directions. `path` proves this for the working
+# modes that it reached, and lists the others as undecided:
 
 # %%
 answer = hrsynth.path(robot, start="x=0,y=0.345", goal=goal)
@@ -173,10 +172,9 @@ assert "opposite signs" in answer.reason
 assert answer.verdict == "undecided"
 
 # %% [markdown]
-# The map shows the tip of the workspace, where both poses are. Its colour is the smallest singular value of Mᵀ, the
-# matrix that gives the rates of the directions from the velocity of the platform (MMT, eq. 7). Along the dark line it
-# is zero: there the platform has a motion that the camera does not see. The start lies above that line, the goal
-# below.
+# The map shows the upper end of the workspace, with both poses. The colour is the smallest singular value of the
+# interaction matrix Mᵀ, which maps the platform twist to the rates of the directions (MMT, eq. 7). Along the dark line
+# it is zero: there a twist of the platform is unobserved. The start lies above that line, the goal below.
 
 # %%
 hrsynth.draw(hrsynth.check(robot, grid="x=-0.06:0.06:17,y=0.29:0.35:25"))
@@ -186,54 +184,53 @@ condition = hrsynth.singularities(robot, points=200)
 condition
 
 # %% [markdown]
-# In words: the tips of the two legs, with their directions held, move along tangents τ₁, τ₂ of the two circles. Where
-# the circles touch, the tangents are parallel, the two modes become one, and the platform is free to move along them.
-# The real robot, driven by its motors, need not be singular there: to see the singularity one has to look at the
-# hidden robot.
+# With fixed directions, the tips of the two legs move along tangents τ₁, τ₂ of the two circles. Where the circles
+# touch, the tangents are parallel, the two modes coincide, and the platform can move along the tangents. The real
+# robot, driven by its motors, need not be singular there. Only the hidden robot shows this singularity.
 
 # %%
-posture = hrsynth.check(robot, at=["x=0,y=0.3332050807568877"]).postures[0]
-print("hidden robot:", posture.hidden.state, "  real robot:", posture.real.state)
-assert (posture.hidden.state, posture.real.state) == ("type2", "regular")
+report = hrsynth.check(robot, at=["x=0,y=0.3332050807568877"]).postures[0]
+print("hidden robot:", report.hidden.state, "  real robot:", report.real.state)
+assert (report.hidden.state, report.real.state) == ("type2", "regular")
 
 # %% [markdown]
-# Every later notebook follows the same plan: find the hidden robot, and ask about it what one asks about any robot.
-# Where are its assembly modes, where its singularities, how accurate is it?
+# Every later notebook follows the same plan: find the hidden robot, then analyse it as any robot. Where are its
+# assembly modes and singularities, and how accurate is it?
 #
 # ## Exercises
 #
 # 1. The tangents are parallel where the cranks are. Check it: take the first singular pose that `condition.examples`
 #    lists and compute the angle between the two cranks there.
-# 2. Hold the *motors* instead of the directions (`hidden.modes(real=True)`). How many poses are there, and why does
-#    the picture of two circles look different?
-# 3. Watch only one rod. What does the controller still see, and what is lost?
+# 2. Fix the *motors* instead of the directions (`hidden.modes(real=True)`). How many poses are there, and why are the
+#    two circles different?
+# 3. Observe only one rod. What is still observed, and what is not?
 
 # %% [markdown]
 # ## Solutions
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
-# 1. where the cranks are at the singular pose: their joints' points, moved with the link
+# 1. the cranks at the singular pose: the points of their joints, moved with the link
 at = condition.examples[0].configuration
 moved = {}
 for i in (1, 2):
-    X = at.pose(f"prox_{i}")  # where the crank is now, in the base frame
-    home = robot.links[f"prox_{i}"].pose  # where it is at the zero configuration
+    X = at.pose(f"prox_{i}")  # pose of the crank, in the base frame
+    zero = robot.links[f"prox_{i}"].pose  # its pose at the zero configuration
     shoulder, elbow = (robot.joints[f"{name}_{i}"].point for name in ("shoulder", "elbow"))
-    moved[i] = (X @ np.linalg.inv(home))[:3, :3] @ (elbow - shoulder)
+    moved[i] = (X @ np.linalg.inv(zero))[:3, :3] @ (elbow - shoulder)
 sine = np.linalg.norm(np.cross(moved[1], moved[2])) / (crank[0] * crank[1])
 print(f"sine of the angle between the cranks: {sine:.1e}")
 assert sine < 1e-6
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
-# 2. with the cranks held, each rod may turn about its elbow: circles of the rods' lengths
+# 2. with the cranks fixed, each rod can rotate about its elbow: circles of the rods' lengths
 real = hidden.modes(real=True)
 print(len(real.modes), "modes:", [str(mode.pose) for mode in real.modes])
-ours = sorted(map(tuple, meet(B, rod)))
+ours = sorted(map(tuple, intersect(B, rod)))
 theirs = sorted((mode.pose.x, mode.pose.y) for mode in real.modes)
 assert np.abs(np.array(theirs) - ours).max() < 1e-9
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
-# 3. one direction is one number in the plane, and the platform has two freedoms: one is lost
+# 3. one direction is one number in the plane, and the platform has two dof: one is unobserved
 one = hrsynth.derive(robot, observe=["1"])
 print(one.verdict)
 assert one.verdict.rank == 1

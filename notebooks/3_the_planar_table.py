@@ -1,8 +1,8 @@
 # %% [markdown]
 # # 3. The planar table
 #
-# MMT's Table 1 lists the legs of planar robots: three joints of type R (it turns) or P (it slides), one of them driven.
-# Its question for each: what becomes of the leg when the camera watches its direction? This notebook computes that
+# MMT's Table 1 lists the legs of planar robots: three joints of type R (revolute) or P (prismatic), one of them
+# actuated. For each it gives the hidden leg when a camera observes the leg's direction. This notebook computes that
 # table, for robots with three equal legs, and adds three columns.
 #
 # In a planar robot a direction is one angle. The virtual motor is an R̲, not a U̲.
@@ -19,7 +19,7 @@ NAMES = ["3rrr_m1", "3rrr_m2", "3rpr_m1", "3rpr_m2", "3prr_m1", "3prr_m2", "3ppr
 
 
 def row(*cells):
-    """Cells in columns; the low line under a motor takes no room."""
+    """Cells in columns; the line under a motor has no width."""
     widths = (10, 9, 10, 24, 8)
     padded = [f"{cell!s:{w + str(cell).count(chr(0x332))}}" for cell, w in zip(cells, widths, strict=False)]
     return "  ".join([*padded, *map(str, cells[len(widths) :])])
@@ -27,11 +27,13 @@ def row(*cells):
 
 derived = {name: hrsynth.derive(hrsynth.load(name)) for name in NAMES}
 numbers = {}
-print(row("robot", "real", "hidden", "verdict", "seen", "modes (real of complex)"))
+print(row("robot", "real", "hidden", "verdict", "rank", "modes (real of complex)"))
 for name, found in derived.items():
     listed = found.modes()
     numbers[name] = (len(listed.modes), listed.found.complex)
-    count = "a continuum" if listed.found.continuous_family else f"{len(listed.modes)} of {listed.found.complex}"
+    count = (
+        "a continuous family" if listed.found.continuous_family else f"{len(listed.modes)} of {listed.found.complex}"
+    )
     print(
         row(
             name,
@@ -52,17 +54,17 @@ for name, found in derived.items():
     leg = PRINTED[name.split("_")[0]]
     assert str(found.hidden_architecture) == f"3-{leg}" if leg else found.hidden_architecture is None
     assert found.equivalence.passed
-print("the same hidden legs as in MMT Table 1, each certified")
+print("the same hidden legs as in MMT Table 1, each passed the equivalence check")
 
 # %% [markdown]
-# ## What the columns say
+# ## What the columns show
 #
-# **Which joint is driven does not matter.** The two robots of a kind differ in their motors and share their hidden
-# robot. The hidden robot forgets the real motors.
+# **The choice of the actuated joint does not matter.** The two robots of a kind differ in their motors and have the
+# same hidden robot. It does not depend on the real motors.
 #
-# **Not every robot can be controlled like this.** In 3-PPR robots the last segment only slides: its direction never
-# changes, the camera sees nothing at all, and there is no hidden robot. In PRP and RRP robots every leg meets the
-# platform in a slide, so each direction shows only the platform's turn, three times over, and nothing of its position:
+# **Not every robot can be controlled like this.** In 3-PPR robots the last segment only translates: its direction never
+# changes, nothing is measured, and there is no hidden robot. In PRP and RRP robots a prismatic joint connects every leg
+# to the platform. So each of the three directions shows only the platform's rotation, and nothing of its position:
 
 # %%
 print(derived["3prp"].verdict)
@@ -72,11 +74,14 @@ assert derived["3prp"].verdict.rank == derived["3rrp"].verdict.rank == 1
 assert derived["3ppr_m1"].verdict.rank == derived["3ppr_m2"].verdict.rank == 0
 
 # %% [markdown]
-# **The assembly modes.** With the directions held, the tip of each leg runs on a curve. It is a line if the leg
-# slides there, and a circle if a crank carries the rod. The platform is a triangle whose corners must lie on three
-# such curves. For three lines there are 2 solutions. For three circles there are 6, when complex ones are counted.
-# That is the classical problem of a triangle on two cranks: its third corner draws a *coupler curve*, and the third
-# circle cuts it in up to six points (MMT Fig. 7).
+#
+# **The assembly modes.** With fixed directions, the locus of each leg's tip is a curve. It is a line if the leg ends
+# with a prismatic joint, and a circle if the rod is on a crank. The platform is a triangle whose corners must lie on
+# three such curves.
+#
+# For three lines there are 2 solutions. For three circles there are 6, complex ones included. That is the classical
+# problem of a triangle on two cranks: its third corner traces a *coupler curve*, and the third circle cuts it in up to
+# six points (MMT Fig. 7).
 #
 # Can all six be real? With the shipped dimensions only two are, but there are others with all six:
 
@@ -96,8 +101,8 @@ assert len(six.modes) == six.found.complex == 6
 hrsynth.draw(six)
 
 # %% [markdown]
-# The blue curve is the coupler curve of the triangle on two legs, the black one is the third leg's circle. All six
-# are proved: an exact polynomial of degree six, its roots isolated, each pose enclosed by interval arithmetic.
+# One curve is the coupler curve of the triangle on two legs, the other the third leg's circle. All six modes are
+# proved: an exact polynomial of degree six, its roots isolated, each pose enclosed by interval arithmetic.
 
 # %%
 print(six.found.proof)
@@ -107,10 +112,10 @@ assert six.found.complete
 # %% [markdown]
 # ## Singularities
 #
-# The platform can move with all directions held where each of its corners can move along its own tangent. Motions of
-# a plane are turns about a point. A turn moves each corner at right angles to the line to that point. So the
-# condition is: the three normals, drawn at the three tips, meet in one point, or are parallel (then it is a
-# translation). That is what `singular` says, and its expression is the determinant of three lines:
+# With fixed directions, each corner of the platform can move only along the tangent of its locus. A planar motion is a
+# rotation about a point, and moves each corner at right angles to the line to that point. So the platform can move if
+# the three normals at the three tips meet in one point, or are parallel (a translation). `singularities` reports this
+# condition, and its expression is the determinant of three lines:
 
 # %%
 condition = hrsynth.singularities(derived["3rrr_m1"].robot, points=300)
@@ -128,12 +133,12 @@ at = example.configuration
 
 
 def now(link, point):
-    """Where a point of a link is at the singular pose; it is given at the zero configuration."""
+    """Position at the singular pose of a point of a link that is given at the zero configuration."""
     X = at.pose(link) @ np.linalg.inv(robot.links[link].pose)
     return (X @ np.append(point, 1.0))[:2]
 
 
-figure, place = plt.subplots(figsize=(6, 6))
+figure, axes = plt.subplots(figsize=(6, 6))
 normals, tips, ends = [], [], []
 for i in (1, 2, 3):
     shoulder = robot.joints[f"shoulder_{i}"].point[:2]
@@ -141,15 +146,15 @@ for i in (1, 2, 3):
     normals.append((elbow - shoulder) / np.linalg.norm(elbow - shoulder))  # the tip's tangent is normal to the crank
     tips.append(tip)
     ends += [tip, shoulder]
-    place.plot(*np.array([shoulder, elbow]).T, color="0.45", lw=4)
-    place.plot(*np.array([elbow, tip]).T, color="C0", lw=2.5)
-    place.axline(tip, slope=normals[-1][1] / normals[-1][0], color="crimson", lw=1, ls="--")
-place.fill(*np.array(tips).T, color="C1", alpha=0.4)
+    axes.plot(*np.array([shoulder, elbow]).T, color="0.45", lw=4)
+    axes.plot(*np.array([elbow, tip]).T, color="C0", lw=2.5)
+    axes.axline(tip, slope=normals[-1][1] / normals[-1][0], color="crimson", lw=1, ls="--")
+axes.fill(*np.array(tips).T, color="C1", alpha=0.4)
 rows = np.array([[n[1], -n[0]] for n in normals])
 centre, residual, *_ = np.linalg.lstsq(rows, np.array([r @ t for r, t in zip(rows, tips, strict=True)]), rcond=None)
-place.plot(*centre, "o", color="crimson", ms=8)
+axes.plot(*centre, "o", color="crimson", ms=8)
 reach = np.abs(np.vstack([*ends, centre])).max() + 0.03
-place.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal", xlabel="x (m)", ylabel="y (m)")
+axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal", xlabel="x (m)", ylabel="y (m)")
 plt.show()
 print("the normals miss a common point by", np.sqrt(residual.max(initial=0.0)), "m")
 print("smallest singular value of Mᵀ there:", example.sigma)
@@ -159,11 +164,11 @@ assert example.sigma < 1e-9
 # %% [markdown]
 # ## Exercises
 #
-# 1. Watch the *first* segment of each leg of `3rrr_m1`, the cranks, instead of the last (`observe=["prox_1",
+# 1. Observe the *first* segment of each leg of `3rrr_m1`, the cranks, instead of the last (`observe=["prox_1",
 #    "prox_2", "prox_3"]`). What is the hidden robot now, and how many modes are there? Which well-known robot is it?
 # 2. `3rpr_m1` has hidden legs R̲PR, the same letters as its real legs. Does the real robot have the same
 #    singularities?
-# 3. Which smallest sets of legs see as much as can be seen (`hrsynth.legs`)? Explain the answer for `3rrp` without a
+# 3. Which smallest sets of legs have the largest rank (`hrsynth.legs`)? Explain the result for `3rrp` without a
 #    computer.
 
 # %% [markdown]
@@ -173,16 +178,16 @@ assert example.sigma < 1e-9
 # 1. the cranks' directions are the motors' angles: the hidden robot is the real one, with its own six modes
 cranks = hrsynth.derive(derived["3rrr_m1"].robot, observe=["prox_1", "prox_2", "prox_3"])
 print(cranks.hidden_architecture, "  real:", cranks.architecture)
-print(cranks.modes().found.complex, "complex modes; with the motors held:", cranks.modes(real=True).found.complex)
+print(cranks.modes().found.complex, "complex modes; with the motors fixed:", cranks.modes(real=True).found.complex)
 assert cranks.modes().found.complex == cranks.modes(real=True).found.complex == 6
 assert str(cranks.hidden_architecture) == str(cranks.architecture)
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
-# 2. yes: the motor and the watched direction are the same angle, so both conditions are the same one
+# 2. yes: motor angle and observed direction are the same angle, so both conditions are the same
 for real in (False, True):
     print(hrsynth.singularities(derived["3rpr_m1"].robot, real=real, points=100).condition.expression)
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
-# 3. each leg of 3rrp tells the platform's turn, so any one leg sees all that can be seen
+# 3. each leg of 3rrp measures the platform's rotation only, so any one leg has the largest rank
 for name in ("3rrr_m1", "3rrp"):
     print(name, hrsynth.legs(derived[name].robot).smallest)

@@ -1,9 +1,9 @@
 # %% [markdown]
 # # 4. Gough-Stewart and 3-U̲PS: eight modes and four planes
 #
-# The Gough-Stewart platform stands on six legs UP̲S: a universal joint on the base, a driven slide, a ball at the
-# platform. Six motors drive six freedoms. How many legs must a camera watch? MMT 4.2.1 says three. Let the program
-# check: `legs` tries all sets.
+# The Gough-Stewart platform has six legs UP̲S: a universal joint on the base, an actuated prismatic joint, a spherical
+# joint at the platform. Six motors actuate six dof. How many legs must a camera observe? MMT 4.2.1 gives three. `legs`
+# tests all sets.
 
 # %%
 from collections import Counter
@@ -19,13 +19,15 @@ plt.style.use("hrsynth.present.style")
 robot = hrsynth.load("gough_stewart")
 sets = hrsynth.legs(robot)
 for size in range(1, 7):
-    words = Counter(f"{each.verdict} (rank {each.rank} of {each.dof})" for each in sets.sets if len(each.legs) == size)
-    print(size, "legs watched:", dict(words))
+    verdicts = Counter(
+        f"{each.verdict} (rank {each.rank} of {each.dof})" for each in sets.sets if len(each.legs) == size
+    )
+    print(size, "legs observed:", dict(verdicts))
 assert all((each.verdict == "controllable") == (len(each.legs) >= 3) for each in sets.sets)
 
 # %% [markdown]
-# A direction in space is two numbers. Three directions are six numbers, and the platform has six freedoms. So at least
-# three legs are needed, and here any three will do. Watch legs 1, 3 and 5:
+# A direction in space is two numbers. Three directions are six numbers, and the platform has six dof. So at least three
+# legs are needed, and here any three are enough. Observe legs 1, 3 and 5:
 
 # %%
 hidden = hrsynth.derive(robot, observe=["1", "3", "5"])
@@ -35,13 +37,13 @@ hidden
 hrsynth.draw(hidden)
 
 # %% [markdown]
-# Look at the last lines of the table. Legs 2, 4 and 6 have six freedoms each, so they constrain nothing. Without
-# motors they only move along with the platform, and the hidden robot does not need them: 3-U̲PS, three legs whose
-# universal joints on the base are driven.
+# Note the last lines of the table. Legs 2, 4 and 6 have six dof each, so they constrain nothing. Without motors they
+# only follow the platform, and the hidden robot does not need them. It is 3-U̲PS: three legs whose universal joints on
+# the base are actuated.
 #
 # ## Eight modes
 #
-# Hold the directions. Then the tip of leg i runs on a line: Bᵢ = Aᵢ + rᵢ uᵢ, with unknown lengths r₁, r₃, r₅. The
+# Fix the directions. Then the tip of leg i moves on a line: Bᵢ = Aᵢ + rᵢ uᵢ, with unknown lengths r₁, r₃, r₅. The
 # triangle of the tips is rigid, so three distances are known, and each is an equation of degree two. Three quadrics
 # meet in at most 2 · 2 · 2 = 8 isolated points.
 #
@@ -51,7 +53,7 @@ hrsynth.draw(hidden)
 POSE = "x=0.05,y=-0.05,z=0.36,rpy=-0.1/0/0.5"
 found = hidden.modes(at=POSE)
 for number, mode in enumerate(found.modes, 1):
-    print(number, mode.pose, "(the pose itself)" if mode.goal else "", "" if mode.reachable else "(out of reach)")
+    print(number, mode.pose, "(the pose itself)" if mode.goal else "", "" if mode.reachable else "(not reachable)")
 print(found.found.proof)
 assert len(found.modes) == 8
 assert found.found.complete
@@ -65,25 +67,25 @@ hrsynth.draw(found)
 
 # %%
 A = np.array([robot.joints[f"shoulder_{i}"].point for i in (1, 3, 5)])
-home = robot.links["platform"].pose
-B_home = np.array([robot.joints[f"wrist_{i}"].point for i in (1, 3, 5)])
+zero = robot.links["platform"].pose
+B_zero = np.array([robot.joints[f"wrist_{i}"].point for i in (1, 3, 5)])
 
 
 def tips(mode):
     """The three tips at a mode, from the pose of the platform."""
-    X = mode.bodies["platform"] @ np.linalg.inv(home)
-    return B_home @ X[:3, :3].T + X[:3, 3]
+    X = mode.bodies["platform"] @ np.linalg.inv(zero)
+    return B_zero @ X[:3, :3].T + X[:3, 3]
 
 
 goal = tips(next(mode for mode in found.modes if mode.goal))
 u = (goal - A) / np.linalg.norm(goal - A, axis=1)[:, None]
 PAIRS = [(0, 1), (1, 2), (2, 0)]
-wanted = np.array([np.sum((B_home[i] - B_home[j]) ** 2) for i, j in PAIRS])
+squares = np.array([np.sum((B_zero[i] - B_zero[j]) ** 2) for i, j in PAIRS])
 
 
 def residual(r):
     B = A + r[:, None] * u
-    return np.array([np.sum((B[i] - B[j]) ** 2) for i, j in PAIRS]) - wanted
+    return np.array([np.sum((B[i] - B[j]) ** 2) for i, j in PAIRS]) - squares
 
 
 def jacobian(r):
@@ -107,8 +109,8 @@ print(len(ours), "solutions; largest difference in a leg's length:", np.abs(np.a
 assert np.abs(np.array(ours) - theirs).max() < 1e-9
 
 # %% [markdown]
-# The real robot, its six motors held, has up to 40 poses, complex ones included. This one is symmetric, and twelve of
-# them lie at infinity. The hidden robot is the simpler of the two:
+# The real robot with fixed motors has up to 40 poses, complex ones included. This one is symmetric, and twelve of them
+# lie at infinity. The hidden robot is the simpler of the two:
 
 # %%
 real = hidden.modes(at=POSE, real=True)
@@ -117,34 +119,34 @@ print(real.found.proof)
 assert real.found.complex == 40 - 12
 
 # %% [markdown]
-# What does a controller do with eight poses that look the same? It ends in one of them, and the start decides in
-# which. Some runs to the pose above from random starts:
+# What does a controller do with eight poses that have the same directions? It converges to one of them, and the start
+# decides to which. Some runs to the pose above from random starts:
 
 # %%
 rng = np.random.default_rng(3)
-ends = Counter()
+outcomes = Counter()
 for _ in range(6):
     x, y, z, turn = rng.uniform((-0.1, -0.1, 0.25, -0.5), (0.1, 0.1, 0.4, 0.5))
     try:
         start = f"x={x:.3f},y={y:.3f},z={z:.3f},rpy=0/0/{turn:.2f}"
         run = hrsynth.servo(robot, ["1", "3", "5"], start=start, goal=POSE)
-        ends[run.outcome if run.run_outcome.matched is None else f"mode {run.run_outcome.matched}"] += 1
+        outcomes[run.outcome if run.run_outcome.matched is None else f"mode {run.run_outcome.matched}"] += 1
     except HrsynthError as error:
-        ends[type(error).__name__] += 1
-assert all(name == "goal" or name.startswith("mode") for name in ends), ends
-dict(ends)
+        outcomes[type(error).__name__] += 1
+assert all(name == "goal" or "mode" in name for name in outcomes), outcomes
+dict(outcomes)
 
 # %% [markdown]
-# A mode far away is a real danger here, because this file gives the slides no limits. A leg that could not grow so
-# long would stop the run at a *boundary* instead.
+# A distant mode is a real danger here, because this file has no limits of the prismatic joints. With limits, the run
+# would stop with the outcome *limit reached*.
 #
 # ## Four planes
 #
-# Where does a motion escape the camera? The platform must move so that each tip moves along its line, v(Bᵢ) ∥ uᵢ.
-# Statics says the same more simply: with the virtual motors held, leg i can push the tip only at right angles to uᵢ,
-# so its forces lie in the plane through Bᵢ normal to uᵢ. The three pencils of forces fail to hold the platform when
-# the three planes, and the plane of the three tips, meet in one point, which may be at infinity (MMT 4.2.1, Fig. 10).
-# `singular` finds this condition by itself and checks it against the rank:
+# Which twist is unobserved? One that moves each tip along its line, v(Bᵢ) ∥ uᵢ. Statics gives the same condition more
+# simply. With fixed virtual motors, leg i exerts forces on the tip only at right angles to uᵢ, in the plane through Bᵢ
+# normal to uᵢ. These forces cannot constrain the platform if the three planes and the plane of the three tips meet in
+# one point (MMT 4.2.1, Fig. 10). The point may be at infinity. `singularities` derives this condition and checks it
+# against the rank:
 
 # %%
 condition = hrsynth.singularities(robot, ["1", "3", "5"], points=300)
@@ -154,13 +156,12 @@ print(condition.checked.points, "poses compared,", condition.checked.disagreemen
 assert not condition.checked.disagreements
 
 # %% [markdown]
-# At a singular pose constructed from the expression, intersect three of the planes and see whether the fourth goes
-# through that point:
+# At a singular pose constructed from the expression, intersect three of the planes. Does the fourth contain that point?
 
 # %%
 example = condition.examples[0]
-X = example.configuration.pose("platform") @ np.linalg.inv(home)
-B = B_home @ X[:3, :3].T + X[:3, 3]
+X = example.configuration.pose("platform") @ np.linalg.inv(zero)
+B = B_zero @ X[:3, :3].T + X[:3, 3]
 n = (B - A) / np.linalg.norm(B - A, axis=1)[:, None]
 point = np.linalg.solve(n, np.sum(n * B, axis=1))
 normal = np.cross(B[1] - B[0], B[2] - B[0])
@@ -170,57 +171,57 @@ print("the platform's plane misses that point by", abs(normal @ (point - B[0])),
 print("smallest singular value of Mᵀ there:", example.sigma)
 assert abs(normal @ (point - B[0])) < 1e-9
 assert example.sigma < 1e-9
-print("lost:", "; ".join(freedom.name for freedom in example.unobserved))
+print("unobserved:", "; ".join(twist.name for twist in example.unobserved))
 
 # %%
 figure = plt.figure(figsize=(7.5, 6.5))
-place = figure.add_subplot(projection="3d")
+axes = figure.add_subplot(projection="3d")
 around = np.linspace(0, 2 * np.pi, 60)
 for i in range(3):
     colour = f"C{2 * i}"
     e1, e2 = np.linalg.svd(n[i][None])[2][1:]  # two directions of the plane
     ring = B[i] + np.linalg.norm(point - B[i]) * (np.cos(around)[:, None] * e1 + np.sin(around)[:, None] * e2)
-    place.add_collection3d(Poly3DCollection([ring], alpha=0.15, color=colour))
-    place.plot(*np.array([A[i], B[i]]).T, color=colour, lw=3, label=f"leg {(1, 3, 5)[i]} and its plane")
-    place.plot(*np.array([B[i], point]).T, color=colour, ls="--", lw=1)
-place.plot(*np.vstack([B, B[:1]]).T, color="C1", lw=3, label="the tips")
-place.plot(*point[:, None], "o", color="crimson", ms=9, label="common point")
-place.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)", aspect="equal")
-place.legend(loc="center left", bbox_to_anchor=(1.05, 0.5))
+    axes.add_collection3d(Poly3DCollection([ring], alpha=0.15, color=colour))
+    axes.plot(*np.array([A[i], B[i]]).T, color=colour, lw=3, label=f"leg {(1, 3, 5)[i]} and its plane")
+    axes.plot(*np.array([B[i], point]).T, color=colour, ls="--", lw=1)
+axes.plot(*np.vstack([B, B[:1]]).T, color="C1", lw=3, label="the tips")
+axes.plot(*point[:, None], "o", color="crimson", ms=9, label="common point")
+axes.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)", aspect="equal")
+axes.legend(loc="center left", bbox_to_anchor=(1.05, 0.5))
 plt.show()
 
 # %% [markdown]
-# ## More legs than needed
+# ## Redundant observation
 #
-# Watching all six legs removes most of the doubt: a pose is a mode only if all six directions agree. Of the eight,
-# only the pose itself is left here.
+# With all six legs observed, a pose is a mode only if all six directions agree. Of the eight, only the pose itself is
+# left here.
 
 # %%
-everything = hrsynth.modes(robot, at=POSE)
-print(len(everything.modes), "mode,", len(everything.near_modes), "near modes")
-assert len(everything.modes) == 1
+all_legs = hrsynth.modes(robot, at=POSE)
+print(len(all_legs.modes), "mode,", len(all_legs.near_modes), "near modes")
+assert len(all_legs.modes) == 1
 
 # %% [markdown]
 # ## Exercises
 #
-# 1. Put the camera on the platform (`camera="platform"`). Which planes must meet now? Guess before you run it.
-# 2. Tsai's 3-UP̲U (`3upu`) only translates. How many legs must be watched? MMT 4.2.1 gives U̲PU as the hidden leg.
-#    Are two such legs the hidden robot for two watched legs? What does the certificate say?
+# 1. Put the camera on the platform (`camera="platform"`). Which planes must meet now? Answer before you run it.
+# 2. Tsai's 3-UP̲U (`3upu`) only translates. How many legs must be observed? MMT 4.2.1 gives U̲PU as the hidden leg. Are
+#    two such legs the hidden robot for two observed legs? What does the equivalence check report?
 # 3. How many of the eight modes are real at random poses? Draw twenty and count. Can the number be odd?
 
 # %% [markdown]
 # ## Solutions
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
-# 1. seen from the platform, base and platform change places: the planes go through the points A_i of the base
+# 1. relative to the platform, base and platform change roles: the planes contain the points A_i of the base
 print(hrsynth.singularities(robot, ["1", "3", "5"], camera="platform", points=100).words)
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
-# 2. two legs; the third must stay as a passive leg, because without it the platform could turn
+# 2. two legs; the third must stay as a passive leg, because without it the platform could rotate
 tsai = hrsynth.load("3upu")
 print("smallest sets:", hrsynth.legs(tsai).smallest)
 two = hrsynth.derive(tsai, observe=["1", "2"])
-print("certified:", two.hidden_architecture, "  unchecked rules:", two.unchecked.hidden, two.unchecked.reason)
+print("derived:", two.hidden_architecture, "  unchecked rules:", two.unchecked.hidden, two.unchecked.reason)
 assert not two.unchecked.equivalent
 
 # %% jupyter={"source_hidden": true} tags=["solution"]

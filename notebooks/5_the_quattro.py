@@ -1,10 +1,10 @@
 # %% [markdown]
-# # 5. The Quattro: which legs to watch
+# # 5. The Quattro: which legs to observe
 #
-# The Quattro is a fast pick-and-place robot. Four arms turn about horizontal axes; two parallel rods, {2-SS}, hang on
-# each; the platform has two halves whose relative motion turns the tool. It has four freedoms: three translations and
-# the turn φ about the vertical. It is the example of MMT 5 and of the experiments there. This notebook asks: which
-# legs should a camera watch to go from one pose to another?
+# The Quattro is a fast pick-and-place robot. Four arms rotate about horizontal axes; each carries two parallel rods,
+# {2-SS}. The platform has two halves whose relative motion rotates the tool. It has four dof: three translations and
+# the rotation φ about the vertical. It is the example of MMT 5 and of the experiments there. Which legs should a camera
+# observe to go from one pose to another?
 
 # %%
 import matplotlib.pyplot as plt
@@ -18,11 +18,13 @@ START, GOAL = "x=0,y=0,z=-0.75,phi=0", "x=-0.2,y=0,z=-0.56,phi=0"
 print(hrsynth.legs(robot))
 
 # %% [markdown]
-# Two directions are four numbers, and the platform has four freedoms. Yet not every pair will do. Legs 1 and 2 hang on
-# the same half of the platform, 3 and 4 on the other. Watching both legs of one half does not show how the other half
-# turns about the hinge. One leg on each half is needed, which leaves four pairs. (The paper counts six, in MMT 5.1.2
-# and A.2: pairs on one half have a hidden robot of the same letters, 2-Π-{2-U̲U}, but the platform's other half hangs
-# free on it.)
+#
+# Two directions are four numbers, and the platform has four dof. Yet not every pair is enough. Legs 1 and 2 are
+# attached to one half of the platform, 3 and 4 to the other. Observing both legs of one half does not show how the
+# other half rotates about its revolute joint. One leg on each half is needed, which leaves four pairs.
+#
+# (The paper counts six, in MMT 5.1.2 and A.2. Pairs on one half have a hidden robot of the same notation, 2-Π-{2-U̲U},
+# but the other half of the platform is not controlled.)
 
 # %%
 for pair in (["1", "2"], ["1", "4"]):
@@ -32,8 +34,8 @@ for pair in (["1", "2"], ["1", "4"]):
     assert found.verdict.rank == (3 if pair == ["1", "2"] else 4)
 
 # %% [markdown]
-# In each watched leg the arm becomes a parallelogram, and the legs that are not
-# watched disappear, once the ends of the watched ones are changed:
+# In each observed leg the arm becomes a parallelogram. The unobserved legs are removed once the end joints of the
+# observed ones are changed:
 
 # %%
 hidden = hrsynth.derive(robot, observe=["1", "4"])
@@ -43,17 +45,19 @@ hidden
 hrsynth.draw(hidden)
 
 # %% [markdown]
-# The rows `leg removal … no` and `end change … yes` at the end retrace MMT 4.2.2. If the legs that are not watched are
-# simply dropped, the platform gains freedoms that it must not have. With universal joints in place of balls at the
-# platform, it does not.
+# The last rows of the table follow MMT 4.2.2. Leg removal alone is not possible: without the unobserved legs the
+# platform gains dof. With the end-joint change, universal joints replace the spherical joints at the platform, and it
+# does not.
 #
 # ## Assembly modes
 #
-# With its direction held, the tip of a leg moves on a circle, that of its parallelogram. The platform has a circle of
-# its own: as its halves turn on each other, the second hinge runs on a horizontal circle about the first. That circle,
-# carried along the circle of one leg, sweeps a surface that MMT 4.2.2 calls a Bohemian dome. It is of degree four, so
-# the circle of the other leg meets it in at most eight points: the modes. The goal of the paper's first simulation
-# (MMT 5.1.3), for two of the pairs:
+#
+# With its direction fixed, the tip of a leg moves on a circle, that of its parallelogram. The platform has its own
+# circle: as its halves rotate on each other, the second revolute joint moves on a horizontal circle about the first.
+#
+# Translated along the circle of one leg, that circle sweeps a surface that MMT 4.2.2 calls a Bohemian dome. It is of
+# degree four, so the circle of the other leg meets it in at most eight points: the modes. The goal of the paper's first
+# simulation (MMT 5.1.3), for two of the pairs:
 
 # %%
 pairs = {legs: hrsynth.derive(robot, observe=list(legs)) for legs in ("14", "23")}
@@ -67,35 +71,38 @@ for legs, each in pairs.items():
             if mode.goal
             else "reachable"
             if mode.reachable
-            else "the real robot cannot be assembled there: legs " + ", ".join(mode.open),
+            else "the real robot cannot be assembled there: legs " + ", ".join(mode.unclosed_legs),
         )
-beyond = [set(mode.open) for mode in pairs["23"].modes(at=GOAL).modes if not (mode.goal or mode.reachable)]
-assert beyond == [{"1", "4"}, {"1", "4"}]
+unclosed = [set(mode.unclosed_legs) for mode in pairs["23"].modes(at=GOAL).modes if not (mode.goal or mode.reachable)]
+assert unclosed == [{"1", "4"}, {"1", "4"}]
 hrsynth.draw(pairs["14"].modes(at=GOAL))
 
 # %% [markdown]
-# The other two legs decide whether the real robot fits. With legs 2 and 3 watched, two of the modes are nothing to
-# worry about: legs 1 and 4 do not reach that far.
+# The other two legs decide whether the real robot can be assembled. With legs 2 and 3 observed, two of the modes are
+# harmless: legs 1 and 4 do not reach that far.
 #
 # ## Servo runs
 #
-# One might think that both pairs are equally good. Same start, same goal, same control law:
+# Are both pairs equally good? Same start, same goal, same control law:
 
 # %%
 runs = {legs: hrsynth.servo(robot, list(legs), start=START, goal=GOAL) for legs in ("14", "23")}
 for run in runs.values():
     metres, radians = run.from_goal
-    away = f"{1e3 * metres:.1f} mm and {np.degrees(radians):.1f}° from the goal"
-    print(f"legs {', '.join(run.setup.labels)}: {run.outcome}, {away}")
-assert [run.outcome for run in runs.values()] == ["mode", "goal"]
+    distance = f"{1e3 * metres:.1f} mm and {np.degrees(radians):.1f}° from the goal"
+    print(f"legs {', '.join(run.setup.labels)}: {run.outcome}, {distance}")
+assert [run.outcome == "goal" for run in runs.values()] == [False, True]
 hrsynth.draw(runs["14"])
 
 # %% [markdown]
-# With legs 1 and 4 the directions reach their desired values but the robot does not reach the goal: it stops at
-# another assembly mode. The same happens in the paper (MMT Figs. 22 and 23). MMT 3.3 explains it by aspects: start and
-# goal must lie in one. Of legs 2 and 3 that is proved, by a straight path. For legs 1 and 4 a path without Type 2
-# singularity exists too, but at its end both legs are in their other working modes, where their directions are not the
-# desired ones. So it is no way for the controller, and no proof that there is none:
+#
+# With legs 1 and 4 the directions reach their desired values but the robot does not reach the goal: it stops at another
+# assembly mode. The same happens in the paper (MMT Figs. 22 and 23). MMT 3.3 explains it by aspects: start and goal
+# must lie in one.
+#
+# For legs 2 and 3 that is proved, by a straight path. For legs 1 and 4 a path without Type 2 singularity exists too.
+# But at its end both legs are in their other working modes, where their directions are not the desired ones. So the
+# controller cannot use it, and it does not prove that there is no other:
 
 # %%
 for legs in ("14", "23"):
@@ -107,8 +114,8 @@ print()
 print(hrsynth.singularities(robot, ["1", "4"], points=200).words)
 
 # %% [markdown]
-# The paper prints digits of the modes too. They are not quite those that its own dimensions give: the second mode of
-# legs 1 and 4 is printed at z = −0.909 (MMT 5.1.3). Here it is, with a proof:
+# The paper also prints the poses of the modes. They differ slightly from those that its dimensions give: the second
+# mode of legs 1 and 4 is printed at z = −0.909 (MMT 5.1.3). Here is the proved one:
 
 # %%
 second = next(mode for mode in pairs["14"].modes(at=GOAL).modes if not mode.goal and abs(mode.pose.rpy[2]) < 1e-6)
@@ -119,9 +126,9 @@ assert abs(-0.909 - second.pose.z) > 0.005
 # %% [markdown]
 # ## Accuracy
 #
-# Cameras are not exact. If each direction may be off by 0.1°, how far may the platform be off? To first order the
-# error is $\delta t = M^{T+} \delta u$ (MMT Appendix A.1), and the largest one for all $\delta u$ inside the cones is
-# found exactly for two legs. A map over the plane z = −0.7 m with φ = 0, as in MMT Figs. 19 and 20:
+# Cameras are not exact. If each direction has an error of up to 0.1°, how large can the error of the platform be? To
+# first order it is $\delta t = M^{T+} \delta u$ (MMT Appendix A.1). The largest one for all $\delta u$ inside the cones
+# is computed exactly for two legs. A map over the plane z = −0.7 m with φ = 0, as in MMT Figs. 19 and 20:
 
 # %%
 maps = {
@@ -138,26 +145,26 @@ hrsynth.draw(maps["24"])
 
 # %% [markdown]
 # In the first map the white curve is a singularity of the hidden robot, and the error grows without bound towards it.
-# The map of the second pair shows no such curve. Which pair is better depends on where the robot works.
+# The second map has no such curve. The better pair depends on the region where the robot works.
 #
 # ## Choose
 #
-# MMT Appendix A.2 puts all this in an order: throw away sets of legs for which start and goal are not in one aspect;
-# rank the rest by accuracy; simulate the best (left out here with `runs=0`: the run is above). `select` does it, and
-# first throws away sets that do not see everything or are singular at an end; before accuracy it ranks by where else
-# the loop may end (left out with `endings=0`):
+# MMT Appendix A.2 proposes an order. Discard sets of legs for which start and goal are not in one aspect; rank the
+# others by accuracy; simulate the best (omitted here with `runs=0`: the run is above). `select` does it. First it
+# discards sets that do not observe all dof or are singular at start or goal. Before accuracy it ranks by the other
+# equilibria of the loop (omitted with `equilibria=0`):
 
 # %%
-best = hrsynth.select(robot, start=START, goal=GOAL, size=2, runs=0, endings=0)
+best = hrsynth.select(robot, start=START, goal=GOAL, size=2, runs=0, equilibria=0)
 best
 
 # %% [markdown]
 # ## More legs, and a local minimum
 #
-# Why not watch all four legs? Then eight numbers fix four freedoms, wrong modes are almost ruled out, and the error
-# tends to become smaller (MMT A.2). But this has a price. With more equations than freedoms the error may have *local
-# minima*: poses where the wanted directions are not reached and yet every small motion makes the error larger. The
-# command vanishes there, and the robot stops.
+# Why not observe all four legs? Then eight numbers determine four dof, other modes are almost excluded, and the error
+# tends to become smaller (MMT A.2). But with more equations than dof the error may have *local minima*. There the
+# desired directions are not reached, and yet every small motion makes the error larger. The command vanishes there, and
+# the robot stops.
 #
 # MMT 5.1.3 prints such a run (Figs. 26 and 27). With the printed dimensions it does not stop:
 
@@ -167,7 +174,7 @@ print(printed.outcome, "at", printed.pose)
 assert printed.outcome == "goal"
 
 # %% [markdown]
-# But the phenomenon is real. A search over random starts and goals found this run:
+# But such runs exist. A search over random starts and goals found this one:
 
 # %%
 stuck = hrsynth.servo(robot, start="x=-0.3,y=0,z=-0.6,phi=0", goal="x=0.05,y=0.07,z=-0.52,phi=0")
@@ -175,16 +182,16 @@ assert stuck.outcome == "local minimum"
 stuck
 
 # %% [markdown]
-# Is it a minimum? Take the poses from where it stopped to the goal, and a little to every side of where it stopped,
-# and measure the error at each. (`batch` gives the directions of many poses at once.)
+# Is it a minimum? Compute the error at poses from the final pose to the goal, and at poses near the final pose.
+# (`batch` gives the directions of many poses at once.)
 
 # %%
-setting = stuck.setup
-X, Y = (at.pose(setting.motion.link) for at in (stuck.settled, stuck.target))
+setup = stuck.setup
+X, Y = (at.pose(setup.motion.link) for at in (stuck.settled, stuck.target))
 
 
-def turned(X, angle):
-    """A pose, turned about the vertical."""
+def rotated(X, angle):
+    """A pose, rotated about the vertical."""
     c, s = np.cos(angle), np.sin(angle)
     moved = X.copy()
     moved[:3, :3] = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ X[:3, :3]
@@ -192,39 +199,39 @@ def turned(X, angle):
 
 
 def shifted(X, by):
-    """A pose, moved by a vector."""
+    """A pose, translated by a vector."""
     moved = X.copy()
     moved[:3, 3] += by
     return moved
 
 
-def size(poses):
+def error_norm(poses):
     """‖e‖ of the eight numbers at each pose."""
-    goal = setting.batch.evaluate(Y[None]).directions[0]
-    return np.linalg.norm(np.cross(setting.batch.evaluate(np.array(poses)).directions, goal), axis=(1, 2))
+    goal = setup.batch.evaluate(Y[None]).directions[0]
+    return np.linalg.norm(np.cross(setup.batch.evaluate(np.array(poses)).directions, goal), axis=(1, 2))
 
 
 angle = np.arctan2(X[1, 0], X[0, 0])
 part = np.linspace(-0.3, 1.3, 161)
-way = [shifted(turned(X, -angle * s), s * (Y - X)[:3, 3]) for s in part]
-figure, place = plt.subplots(figsize=(7, 4))
-place.plot(part, size(way))
-place.plot([0, 1], size([X, Y]), "o", color="crimson")
-place.annotate("stopped here", (0, size([X])[0]), xytext=(0, 20), textcoords="offset points", ha="center")
-place.annotate("goal", (1, 0), xytext=(14, 4), textcoords="offset points")
-place.set(xlabel="part of the way to the goal", ylabel="‖e‖", ylim=(0, None))
+path = [shifted(rotated(X, -angle * s), s * (Y - X)[:3, 3]) for s in part]
+figure, axes = plt.subplots(figsize=(7, 4))
+axes.plot(part, error_norm(path))
+axes.plot([0, 1], error_norm([X, Y]), "o", color="crimson")
+axes.annotate("stopped here", (0, error_norm([X])[0]), xytext=(0, 20), textcoords="offset points", ha="center")
+axes.annotate("goal", (1, 0), xytext=(14, 4), textcoords="offset points")
+axes.set(xlabel="fraction of the distance to the goal", ylabel="‖e‖", ylim=(0, None))
 plt.show()
 
 # %%
-steps = [shifted(X, s * axis) for s in (1e-3, -1e-3) for axis in np.eye(3)] + [turned(X, s) for s in (0.01, -0.01)]
-growth = size(steps) - size([X])
-print("‖e‖ where it stopped:", size([X])[0])
-print("change one millimetre, or 0.01 rad, to each side:", growth.round(7))
+steps = [shifted(X, s * axis) for s in (1e-3, -1e-3) for axis in np.eye(3)] + [rotated(X, s) for s in (0.01, -0.01)]
+growth = error_norm(steps) - error_norm([X])
+print("‖e‖ at the final pose:", error_norm([X])[0])
+print("change by one millimetre, or 0.01 rad, in each direction:", growth.round(7))
 assert (growth > 0).all()
 
 # %% [markdown]
-# Every step makes it worse. So more legs do not cure everything. No rank shows that
-# there are no local minima: at this pose Mᵀ has full rank.
+# Every step makes it larger. So more legs do not solve every problem. The rank does not show local minima: at this pose
+# Mᵀ has full rank.
 
 # %%
 print(stuck.run.commands[-1].values)
@@ -233,12 +240,12 @@ assert min(stuck.run.commands[-1].values) > 0.05
 # %% [markdown]
 # ## Exercises
 #
-# 1. The rigid Quattro (`quattro_rigid`) has a platform in one piece and three freedoms. Which pairs of legs will do
-#    now? Count the modes for neighbouring and for opposite legs.
-# 2. With noise the run of legs 2 and 3 does not stand still at the goal. Run it with `noise="0.1deg"` and compare how
-#    far it strays with the largest error that `accuracy` gives at the goal.
-# 3. The paper says that one watched leg on each half is singular where the legs' planes are parallel. `singular`
-#    gives another condition. Show that the paper's is a special case of it.
+# 1. The rigid Quattro (`quattro_rigid`) has a platform of one link and three dof. Which pairs of legs are enough now?
+#    Count the modes for neighbouring and for opposite legs.
+# 2. With noise the run of legs 2 and 3 keeps moving near the goal. Run it with `noise="0.1deg"`. Compare its deviation
+#    with the largest error that `accuracy` gives at the goal.
+# 3. In the paper, one observed leg on each half is singular where the legs' planes are parallel. `singularities` gives
+#    another condition. Show that the paper's is a special case of it.
 
 # %% [markdown]
 # ## Solutions
@@ -252,10 +259,10 @@ for pair in (["1", "2"], ["1", "3"]):
     print(pair, hrsynth.modes(rigid, pair, at="x=0,y=-0.25,z=-0.7").found.complex, "complex modes")
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
-# 2. the loop averages the noise: it strays less than a single wrong picture could move it
+# 2. the loop averages the noise: it deviates less than a single measurement with that error would move it
 noisy = hrsynth.servo(robot, ["2", "3"], start=START, goal=GOAL, noise="0.1deg")
 bound = hrsynth.accuracy(robot, ["2", "3"], cone="0.1deg", at=[GOAL]).poses[0].position.largest
-print(f"strays by {1e3 * noisy.spread.rms_metres:.2f} mm (root mean square)")
+print(f"deviation {1e3 * noisy.spread.rms_metres:.2f} mm (root mean square)")
 print(f"largest first-order error {1e3 * bound:.2f} mm")
 assert noisy.spread.rms_metres < bound
 

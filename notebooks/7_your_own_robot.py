@@ -1,8 +1,8 @@
 # %% [markdown]
 # # 7. Bring your own robot file
 #
-# Everything so far used shipped robots. This notebook writes a robot file from nothing, makes mistakes in it, reads a
-# file of another tool, and writes files back.
+# All notebooks so far used shipped robots. This one writes a robot file, makes mistakes in it, reads a file of another
+# tool, and writes files.
 
 # %%
 import tempfile
@@ -18,7 +18,7 @@ folder = Path(tempfile.mkdtemp())
 #
 # URDF describes trees: every link has one parent. A parallel robot has loops. The rule is simple: write a spanning
 # tree, and for each joint that would close a loop write a `<loop>`, which most other URDF readers ignore. Two more
-# elements say what is driven and what is watched.
+# elements name the motors and the observations.
 
 # %%
 FOUR_BAR = """<robot name="four_bar">
@@ -43,18 +43,17 @@ robot = hrsynth.load(file)
 robot
 
 # %% [markdown]
-# The frames of a loop lie on its two links, and with all joints at zero they must coincide: here at x = 2.3, z = 1.2,
-# measured from the base along either side. One freedom, one watched direction, that of the crank:
+# The frames of a loop are on its two links, and must coincide at the zero configuration: here at x = 2.3, z = 1.2 in
+# the base frame. One dof, one observed direction, that of the crank:
 
 # %%
 print(hrsynth.derive(robot, observe=["1"]))
 
 # %% [markdown]
-# The crank is watched and it is driven, so the hidden robot is the real one: the camera is an encoder here. The
-# rocker, which is not watched, must stay. Without it the bar could turn about the crank's end, as the form of
-# unchecked rules, below the certificate, would.
+# The crank is observed and actuated, so the hidden robot is the real one: the camera acts as an encoder here. The
+# rocker is not observed but must stay. Without it the bar could rotate about the crank's end, as in the unchecked form.
 #
-# With the crank's direction held, the four-bar has two poses, its bar and rocker folded to one side or the other:
+# With the crank's direction fixed, the four-bar has two poses, its bar and rocker folded to one side or the other:
 
 # %%
 found = hrsynth.modes(robot, ["1"])
@@ -64,7 +63,7 @@ hrsynth.draw(found)
 # %% [markdown]
 # ## Mistakes
 #
-# A file with mistakes is refused; all of them are listed at once, each with its line. Nothing is repaired silently.
+# A file with mistakes is refused. All mistakes are listed at once, each with its line. Nothing is repaired silently.
 
 # %%
 broken = FOUR_BAR.replace('child link="rocker"', 'child link="rokcer"').replace('type="revolute"', 'type="hinge"')
@@ -76,8 +75,8 @@ except HrsynthError as error:
         print(line.replace(str(folder), "…"))
 
 # %% [markdown]
-# The most common mistake is a loop that is not closed. Its frames were meant to meet and do not. The program does not
-# know which number is wrong. It knows by how much they miss:
+# The most common mistake is a loop that is not closed: its frames do not coincide. The program cannot know which number
+# is wrong. It reports the closure residual:
 
 # %%
 (folder / "open.urdf").write_text(FOUR_BAR.replace("2.3 0 0.2", "2.4 0 0.2"))
@@ -90,7 +89,7 @@ except HrsynthError as error:
 # ## A file of another tool
 #
 # MuJoCo closes loops by equality constraints. Below is a typical planar five-bar: two arms, a `connect` where they
-# meet, two actuators. Nothing in it says which body is the platform.
+# meet, two actuators. Nothing in it names the platform.
 
 # %%
 FIVE_BAR = """<mujoco model="five_bar">
@@ -123,15 +122,15 @@ except HrsynthError as error:
 other
 
 # %% [markdown]
-# What was guessed, solved or merged while reading is reported, one line each:
+# What reading assumed, solved or merged is reported, one line each:
 
 # %%
 for note in other.notes:
     print(note)
 
 # %% [markdown]
-# A `connect` only makes two points meet. In a planar loop it does what a revolute joint does, and is read as one. So
-# this is the robot of notebook 1 again:
+# A `connect` only makes two points coincide. In a planar loop it is equivalent to a revolute joint, and is read as one.
+# So this is a robot like that of notebook 1:
 
 # %%
 print(repr(hrsynth.derive(other)))
@@ -141,23 +140,23 @@ print(repr(hrsynth.modes(other)))
 # %% [markdown]
 # ## Writing
 #
-# `save` writes the native dialect, MJCF, SDFormat or Gepetto's URDF with YAML, by the file's ending, and returns what
-# the dialect cannot express. The hidden robot is a mechanism like any other and can be written too, to be looked at,
-# simulated, or derived from again:
+# `save` writes the native format, MJCF, SDFormat or Gepetto's URDF with YAML, by the suffix of the file, and returns
+# what the format cannot express. The hidden robot is a mechanism like any other and can be written too, to be viewed,
+# simulated or analysed:
 
 # %%
 hidden = hrsynth.derive(hrsynth.load("3rrr_m1"))
-for ending in (".urdf", ".xml", ".sdf"):
-    lost = hrsynth.save(hidden.hidden, folder / f"hidden{ending}")
-    back = hrsynth.load(folder / f"hidden{ending}", platform="platform")
+for suffix in (".urdf", ".xml", ".sdf"):
+    omitted = hrsynth.save(hidden.hidden, folder / f"hidden{suffix}")
+    back = hrsynth.load(folder / f"hidden{suffix}", platform="platform")
     print(
-        f"{ending:6}{(folder / f'hidden{ending}').stat().st_size:6} bytes, read back: {back.headline()};",
-        "; ".join(map(str, lost)) or "nothing lost",
+        f"{suffix:6}{(folder / f'hidden{suffix}').stat().st_size:6} bytes, read back: {back.headline()};",
+        "; ".join(map(str, omitted)) or "nothing omitted",
     )
 
 # %% [markdown]
-# The hidden robot of a hidden robot? Its motors turn what the camera watches. So watching the same directions changes
-# nothing:
+# The hidden robot of a hidden robot? Its motor coordinates are the observed directions. So observing the same
+# directions changes nothing:
 
 # %%
 again = hrsynth.derive(hrsynth.load(folder / "hidden.urdf"))
@@ -167,7 +166,7 @@ assert str(again.architecture) == str(again.hidden_architecture)
 # %% [markdown]
 # ## Exercises
 #
-# 1. Put the motor of the four-bar on joint `c` and watch the rocker instead of the crank. What changes in the hidden
+# 1. Put the motor of the four-bar on joint `c` and observe the rocker instead of the crank. What changes in the hidden
 #    robot?
 # 2. Give the crank's joint `a` limits (type `revolute`, a `<limit>` from −0.5 to 0.5) and list the modes again. Which
 #    are reachable now?
@@ -178,11 +177,11 @@ assert str(again.architecture) == str(again.hidden_architecture)
 # ## Solutions
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
-# 1. nothing but the names: what is watched becomes the motor, whoever drove the robot before
-turned = FOUR_BAR.replace('<joint name="a"/> </transmission>', '<joint name="c"/> </transmission>')
-turned = turned.replace('leg="1" link="crank" axis="0 0 1"', 'leg="2" link="rocker" axis="0.3 0 1.2"')
-(folder / "turned.urdf").write_text(turned)
-print(repr(hrsynth.derive(hrsynth.load(folder / "turned.urdf"), observe=["2"])))
+# 1. only the names: the observed direction becomes the motor, whichever joint was actuated
+swapped = FOUR_BAR.replace('<joint name="a"/> </transmission>', '<joint name="c"/> </transmission>')
+swapped = swapped.replace('leg="1" link="crank" axis="0 0 1"', 'leg="2" link="rocker" axis="0.3 0 1.2"')
+(folder / "swapped.urdf").write_text(swapped)
+print(repr(hrsynth.derive(hrsynth.load(folder / "swapped.urdf"), observe=["2"])))
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 2. the crank's angle is the same in all modes, so its own limits exclude none
@@ -196,7 +195,7 @@ for mode in hrsynth.modes(hrsynth.load(folder / "limited.urdf"), ["1"]).modes:
     assert mode.goal or mode.reachable
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
-# 3. the same joints at the same places; only the spheres drawn on the links differ
+# 3. the same joints at the same points; only the spheres drawn on the links differ
 from hrsynth.mechanism.builder import Builder
 
 b = Builder("five_bar")

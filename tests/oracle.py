@@ -102,7 +102,7 @@ class Rows:
 
     A force n (in i) at the point p keeps n . (p_j - p_i) = 0; a moment along beta x alpha keeps alpha (in i) . beta (in
     j) = c. Both are exact wherever they are evaluated, closed or not. ``upright`` lists pairs alpha, beta whose product
-    must be positive: the equations alone cannot tell an axis from its opposite.
+    must be positive: the equations alone do not distinguish an axis from its opposite.
     """
 
     forces: list[tuple[int, int, Array, Array, Array]] = field(default_factory=list)
@@ -184,7 +184,7 @@ moments normal to its rotations (a universal joint adds its one moment, along e1
 
 
 def rows_of(joint: Joint, i: int, j: int, X_i: Array, X_j: Array) -> Rows:
-    """The wrenches reciprocal to the freedoms of a joint between the links i and j, which have these poses at zero."""
+    """The wrenches reciprocal to the twists of a joint between the links i and j, which have these poses at zero."""
     rows = Rows()
     frame = pose(joint.point, triad(joint.axis) if joint.axes else np.eye(3))
     rows.tie(i, j, inverse(X_i) @ frame, inverse(X_j) @ frame, *RECIPROCAL[joint.type])
@@ -269,7 +269,7 @@ class Oracle:
         return self._units[:, None] * right[rank:].T, gap
 
     def mobility(self, state: Array) -> int:
-        """dim T_qC, idle motions included. Raises :class:`Undecided`."""
+        """dim T_qC, internal motions included. Raises :class:`Undecided`."""
         return int(self._believed(state).shape[1])
 
     def _believed(self, state: Array) -> Array:

@@ -200,7 +200,7 @@ def spherical(rng: Rng) -> Mechanism:
 def pods(words: Sequence[str], rng: Rng, square: bool = False) -> Mechanism:
     """A platform on one leg a word (UPS, RPS, UPU, SPS), driven by the P joints, all rods observed.
 
-    Where there are fewer legs than freedoms, base joints are driven too. ``square``: the axes next to the rods, of the
+    If there are fewer legs than dof, base joints are actuated too. ``square``: the axes next to the rods, of the
     base joints and of the U joints above, are normal to the rods; otherwise they are random.
     """
     n = len(words)
@@ -249,7 +249,7 @@ def deltas(bases: Sequence[str], rods: Sequence[str], rng: Rng, aligned: bool) -
     """A rigid platform on one leg a pair: a driven R or P at the base, then 2-SS, US, UU or SS.
 
     The (first) rods are observed. ``aligned``: the side of a 2-SS and the outer axes of a UU are parallel to the base's
-    R axis (where it is a P: to the tangent of the ring of feet); otherwise they are random.
+    R axis (where it is a P: to the tangent of the ring of base points); otherwise they are random.
     """
     n = len(bases)
     tilt = random_rotation(rng)
@@ -420,7 +420,7 @@ def split(mechanism: Mechanism, rng: Rng, kinds: Collection[str] = SPLITS) -> Me
     """One place rewritten by what means the same; unchanged where there is none.
 
     ``spherical``: an S becomes three R at one point; ``universal``: a U becomes two R; ``link``: a link is cut in two
-    by a fixed joint. ``coaxial``, to be asked for: an R becomes two on one axis, which adds an idle motion.
+    by a fixed joint. ``coaxial`` (optional): an R becomes two on one axis, which adds an internal motion.
     """
     wanted = {"spherical": JointType.SPHERICAL, "universal": JointType.UNIVERSAL, "coaxial": JointType.REVOLUTE}
     places = [

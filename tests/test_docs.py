@@ -1,4 +1,4 @@
-"""The site: it is built strictly, needs no network, and has a page for every notebook, folder and public name."""
+"""The site: built strictly, without network, with a page for every notebook, folder and public name."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ PAGES = sorted((ROOT / "docs" / "pages").glob("*.md"))
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.name)
-def test_what_a_page_names_is_there(page: Path):
+def test_paths_on_pages_exist(page: Path):
     """Paths of the project in code style."""
     text = page.read_text(encoding="utf-8")
     named = re.findall(r"`((?:src|docs|tests|notebooks|robots|catalog|studies)/[\w/.]*)`", text)
     assert [name for name in named if not (ROOT / name).exists()] == []
 
 
-def test_ten_numbers_say_by_which_command_they_are_made_again():
+def test_ten_numbers_have_their_commands():
     text = (ROOT / "docs" / "pages" / "how_sure.md").read_text(encoding="utf-8")
     assert len(re.findall(r"^\| \d+\. .* \| `(?:make|python) [^|]*\|$", text, re.MULTILINE)) == 10
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
@@ -37,13 +37,13 @@ def test_ten_numbers_say_by_which_command_they_are_made_again():
     assert [name for name in modules if not (ROOT / "tests" / f"{name.replace('.', '/')}.py").exists()] == []
 
 
-def test_the_architecture_page_tells_of_every_folder():
+def test_the_architecture_page_lists_every_folder():
     text = (ROOT / "docs" / "pages" / "architecture.md").read_text(encoding="utf-8")
     folders = {path.name for path in (ROOT / "src" / "hrsynth").iterdir() if (path / "__init__.py").exists()}
     assert {name for name in folders if f"`{name}/`" not in text} == set()
 
 
-def test_every_picture_has_its_command_and_is_shown():
+def test_every_figure_has_its_command_and_is_shown():
     import pictures
 
     kept = {path.name for path in (ROOT / "docs" / "pictures").iterdir()}
@@ -69,7 +69,7 @@ def test_commands_on_robots_of_example_robot_data_work(line: str, capsys):
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The site, its notebooks without outputs where no executed copy is kept."""
+    """The site; notebooks without a stored executed copy have no outputs."""
     pytest.importorskip("mkdocs")
     folder = tmp_path_factory.mktemp("site")
     run = subprocess.run(
@@ -97,7 +97,7 @@ def test_the_site_is_built_strictly_and_needs_no_network(site: Path):
 
 
 @pytest.mark.slow
-def test_it_starts_with_the_moving_robot_and_three_doors_and_shows_every_picture_with_its_command(site: Path):
+def test_it_starts_with_the_moving_robot_and_three_doors_and_shows_every_figure_with_its_command(site: Path):
     start = (site / "index.html").read_text(encoding="utf-8")
     assert 'src="pictures/servo_quattro.gif"' in start
     assert re.findall(r"<h3[^>]*>(For \w+)", start) == ["For students", "For teachers", "For engineers"]

@@ -1,4 +1,4 @@
-"""The README and the pages: tables are what the program says today, runs print what is shown, with its numbers."""
+"""The README and the pages: generated tables are up to date, commands print the shown lines with their numbers."""
 
 from __future__ import annotations
 
@@ -33,8 +33,7 @@ LONGEST = 8_000
 SHOWN = "\n".join(file.read_text(encoding="utf-8") for file in (ROOT / "README.md", *sorted(PAGES.glob("*.md"))))
 NUMBER = r"-?\d+\.?\d*(?:e[-+]\d+)?"
 ROUNDING, CLEAR = 1e-8, 1e6
-"""Numbers printed with an exponent that are smaller are rounding errors, rank gaps that are larger are clear ones: both
-differ from machine to machine."""
+"""Numbers with an exponent that differ between machines: rounding errors below, clear rank gaps above."""
 
 
 def lines() -> dict[str, str]:
@@ -98,23 +97,25 @@ def test_the_readme_is_short():
     assert len(README.encode()) <= LONGEST
 
 
-def test_the_python_example_runs_and_prints_what_it_says():
+def test_the_python_example_runs_and_prints_the_shown_lines():
     code = re.search(r"```python\n(.*?)```", README, re.DOTALL)[1]
-    said = re.findall(r"# → (.*)", code)
+    shown = re.findall(r"# → (.*)", code)
     with contextlib.redirect_stdout(io.StringIO()) as output:
         exec(compile(code, "README.md", "exec"), {})
-    assert output.getvalue().splitlines() == said
+    assert output.getvalue().splitlines() == shown
 
 
 @pytest.mark.parametrize("page", ["use_pinocchio.md", "poses_by_joints.md"])
-def test_the_program_of_a_page_runs_and_prints_what_it_says(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_the_program_of_a_page_runs_and_prints_the_shown_lines(
+    page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     pytest.importorskip("mujoco")
     monkeypatch.chdir(tmp_path)
     code = "\n".join(re.findall(r"```python\n(.*?)```", (PAGES / page).read_text("utf-8"), re.DOTALL))
-    said = re.findall(r"# → (.*)", code)
+    shown = re.findall(r"# → (.*)", code)
     with contextlib.redirect_stdout(io.StringIO()) as output:
         exec(compile(code, page, "exec"), {})
-    assert all(itertools.starmap(_alike, zip(said, output.getvalue().splitlines(), strict=True)))
+    assert all(itertools.starmap(_alike, zip(shown, output.getvalue().splitlines(), strict=True)))
 
 
 @pytest.mark.slow
@@ -138,7 +139,7 @@ def test_the_tutorial_of_an_own_file_works(tmp_path: Path, monkeypatch: pytest.M
 def test_the_commands_print_what_is_shown(
     command: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """Line by line, with its numbers; a page may leave lines out."""
+    """Line by line, with its numbers; a page can omit lines."""
     monkeypatch.chdir(tmp_path)
     assert execute(shlex.split(command)) == 0
     printed = capsys.readouterr().out.splitlines()
@@ -171,7 +172,7 @@ def test_lines_are_compared_with_their_numbers(shown: str, printed: str, same: b
 
 
 def _alike(shown: str, printed: str) -> bool:
-    """The same words and numbers: to one unit in the last place that is shown, spaces and rules of any length."""
+    """Return True if words and numbers agree: to one unit in the last shown digit, spaces and rules of any length."""
     if _words(shown) != _words(printed):
         return False
     return all(_near(a, b) for a, b in zip(re.findall(NUMBER, shown), re.findall(NUMBER, printed), strict=True))

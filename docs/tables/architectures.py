@@ -22,7 +22,7 @@ Record = Mapping[str, Any]
 
 
 def mark(leg: LegKey) -> int:
-    """The joint after which the observed link of a leg follows."""
+    """Return the index of the joint before the observed link of a leg."""
     if leg.observed is not None:
         return leg.observed
     slides = [i for i in range(1, len(leg.joints) - 1) if leg.joints[i].letter == "P"]
@@ -34,25 +34,25 @@ def mark(leg: LegKey) -> int:
 
 
 def centres(leg: LegKey, end: int = 0) -> str | None:
-    """Where the platform's instantaneous centre can be while the observed direction of a planar leg is held; None where
-    that is anywhere. ``end``: how many joints at the platform are left out."""
+    """Return the locus of the platform's instantaneous centre for a fixed direction of a planar leg; None if it is the
+    plane. ``end``: number of joints at the platform that are omitted."""
     last, joints = mark(leg), leg.joints[: len(leg.joints) - end]
     turning = [
         i for i, joint in enumerate(joints[: last + 1]) if joint.letter == "R" or (joint.letter == "Pi" and i == last)
     ]
     if not turning:
         return None
-    rest = [joint for i, joint in enumerate(joints) if i not in turning]
-    # of k joints that turn the link, k - 1 freedoms are left: two R shift what follows, an R and a Pi turn it too
-    turned = sum(joint.letter == "R" for joint in rest) + (joints[last].letter == "Pi" and len(turning) > 1)
-    if len(rest) + len(turning) - 1 - turned == 2:
+    others = [joint for i, joint in enumerate(joints) if i not in turning]
+    # k joints that rotate the link leave k - 1 dof: two R translate the next links, an R and a Pi also rotate them
+    turned = sum(joint.letter == "R" for joint in others) + (joints[last].letter == "Pi" and len(turning) > 1)
+    if len(others) + len(turning) - 1 - turned == 2:
         return INFINITY
-    return RAIL if [(joint.letter, joint.axes) for joint in rest if joint.letter != "R"] == [("P", "x")] else GENERAL
+    return RAIL if [(joint.letter, joint.axes) for joint in others if joint.letter != "R"] == [("P", "x")] else GENERAL
 
 
 def planar_rank(word: ArchitectureKey) -> int:
-    """What the legs of a planar robot see: the rank of their lines of centres; of a point, of the ways left to it.
-    Rails that are parallel are all along x."""
+    """Return the rank of the legs of a planar robot: of their lines of centres; of a point: of its free directions.
+    Parallel rails are all along x."""
     point = word.platform == "point"
     found = Counter(centres(leg, 1 if point else 0) for leg in word.legs)
     if point:
@@ -61,7 +61,7 @@ def planar_rank(word: ArchitectureKey) -> int:
 
 
 def delta_controllable(word: ArchitectureKey, dof: int) -> bool:
-    """Whether deltas of these legs are controllable: their slides are not all parallel, and the legs are enough."""
+    """Return True if deltas of these legs are controllable: rails not all parallel, and enough legs."""
     first = {leg.unmoved.joints[0] for leg in word.legs}
     parallel = len({joint.axes for joint in first}) == 1 and all(
         joint.letter == "P" and joint.axes in ("x", "y", "z") for joint in first
@@ -70,7 +70,7 @@ def delta_controllable(word: ArchitectureKey, dof: int) -> bool:
 
 
 def translating(word: ArchitectureKey) -> bool:
-    """Whether a word is of legs that translate (:func:`hrsynth.catalog.groups.spatial.translates`) and of no others."""
+    """Return True if all legs of a key translate (:func:`hrsynth.catalog.groups.spatial.translates`)."""
     joints = [joint for leg in word.legs for joint in leg.joints]
     return all(joint.letter in "RP" and joint.axes in "abhjk" for joint in joints) and all(
         translates(leg.chain) for leg in word.legs
@@ -78,15 +78,15 @@ def translating(word: ArchitectureKey) -> bool:
 
 
 def split(leg: LegKey, place: int) -> int:
-    """Of how many directions of R some, but not all, come before a place in a leg."""
+    """Count the directions of R of which some, but not all, come before an index in a leg."""
     axes = [joint.axes if joint.letter == "R" else "" for joint in leg.joints]
     return sum(0 < axes[:place].count(axis) < axes.count(axis) for axis in set(axes) - {""})
 
 
 def translation_rank(word: ArchitectureKey) -> int:
-    """What legs that translate see: each the directions of R on both sides of the watched link, all together at most
-    three. Slides of the catalog are normal to z: legs with two that never turn see z, and so does a leg with one that
-    tells two numbers, which are all that is normal to it."""
+    """Return the rank of legs that translate: the directions of R on both sides of each observed link, at most three.
+    P joints of the catalog are normal to z: legs with two of constant direction observe z, and so does a leg with one
+    that gives two numbers, the two components normal to it."""
     seen, along, known = 0, 0, False
     for leg in word.legs:
         numbers = split(leg, mark(leg) + 1)
@@ -100,12 +100,12 @@ def translation_rank(word: ArchitectureKey) -> int:
 
 
 def studied(catalog: Catalog) -> list[Record]:
-    """The records that have a verdict."""
+    """Return the records that have a verdict."""
     return [each for each in catalog if not each.get("refused")]
 
 
 def motions(catalog: Catalog) -> str:
-    """Verdicts by kind of motion."""
+    """Tabulate the verdicts by kind of motion."""
     by: dict[str, Counter[str]] = {}
     for each in studied(catalog):
         by.setdefault(each["motion"], Counter())[each["verdict"]] += 1
@@ -117,12 +117,12 @@ def motions(catalog: Catalog) -> str:
 
 
 def numbers(record: Record) -> int:
-    """How many legs must be watched at least: a direction is two numbers, in a plane one."""
+    """Return the least number of observed legs: a direction is two numbers, in a plane one."""
     return int(record["dof"]) if record["group"] == "planar" else math.ceil(record["dof"] / 2)
 
 
 def fewest(catalog: Catalog) -> str:
-    """How many controllable architectures need as many legs as numbers ask for, and how many need more."""
+    """Tabulate controllable architectures by the number of legs above the bound of ``numbers``."""
     by: dict[tuple[str, str, int], Counter[int]] = {}
     for each in studied(catalog):
         if each["verdict"] == CONTROLLABLE:
@@ -136,10 +136,10 @@ def fewest(catalog: Catalog) -> str:
 
 
 def chains(catalog: Catalog) -> str:
-    """Verdicts of robots with equal legs, by the letters of the leg."""
+    """Tabulate the verdicts of robots with equal legs, by the letters of the leg."""
     by: dict[tuple[str, str], Counter[str]] = {}
     for each in studied(catalog):
-        word = parse(each["word"])
+        word = parse(each["key"])
         letters = {"".join(joint.letter for joint in leg.joints) for leg in word.legs}
         if len(letters) == 1:
             by.setdefault((each["group"], *letters), Counter())[each["verdict"]] += 1
@@ -150,19 +150,19 @@ def chains(catalog: Catalog) -> str:
     return table(("group", "legs", *VERDICTS, "controllable (%)"), rows, 1)
 
 
-def cures(catalog: Catalog) -> str:
-    """How many further measurements the others need."""
+def suggestions(catalog: Catalog) -> str:
+    """Tabulate the number of additional observations that the others need."""
     found: Counter[str] = Counter()
     for each in studied(catalog):
         if each["verdict"] != CONTROLLABLE:
-            text = each["cure"]
+            text = each["suggestion"]
             known = not text.startswith(("none", "not all"))
             found[str(text.count(" and ") + 1) if known else "none of up to four was found"] += 1
-    return table(("further measurements", "architectures"), [(key, f"{n:,}") for key, n in sorted(found.items())], 1)
+    return table(("additional observations", "architectures"), [(key, f"{n:,}") for key, n in sorted(found.items())], 1)
 
 
 def rules(catalog: Catalog) -> str:
-    """How many records agree with each rule."""
+    """Tabulate the number of records that agree with each rule."""
 
     def agree(records: Iterable[bool]) -> str:
         truth = list(records)
@@ -172,12 +172,12 @@ def rules(catalog: Catalog) -> str:
     rows = [
         (
             "planar: rank of the lines of instantaneous centres",
-            agree(planar_rank(parse(each["word"])) == each["rank"] for each in every if each["group"] == "planar"),
+            agree(planar_rank(parse(each["key"])) == each["rank"] for each in every if each["group"] == "planar"),
         ),
         (
             "deltas: P not all parallel, at least dof/2 legs",
             agree(
-                delta_controllable(parse(each["word"]), each["dof"]) == (each["verdict"] == CONTROLLABLE)
+                delta_controllable(parse(each["key"]), each["dof"]) == (each["verdict"] == CONTROLLABLE)
                 for each in every
                 if each["group"] == "deltas"
             ),
@@ -188,7 +188,7 @@ def rules(catalog: Catalog) -> str:
                 translation_rank(word) == each["rank"]
                 for each in every
                 if each["group"] in ("mixed", "spatial")
-                if translating(word := parse(each["word"]))
+                if translating(word := parse(each["key"]))
             ),
         ),
         (
@@ -199,21 +199,21 @@ def rules(catalog: Catalog) -> str:
     return table(("rule", "agree"), rows, 1)
 
 
-TABLES = {"motions": motions, "fewest": fewest, "chains": chains, "suggestions": cures, "rules": rules}
+TABLES = {"motions": motions, "fewest": fewest, "chains": chains, "suggestions": suggestions, "rules": rules}
 
 
 def start(name: str) -> str:
-    """The mark before a table."""
+    """Return the mark before a table."""
     return f"<!-- generated: {name} -->"
 
 
 def written(text: str, catalog: Catalog, tables: Mapping[str, Callable[[Catalog], str]] = TABLES) -> str:
-    """A page with its tables."""
+    """Return a page with its tables."""
     for name, made in tables.items():
         text = replace_between(text, made(catalog), start(name))
     return text
 
 
 def share(found: Counter[str]) -> str:
-    """How many of hundred are controllable."""
+    """Return the percentage of controllable ones."""
     return f"{100 * found[CONTROLLABLE] / sum(found.values()):.0f}"

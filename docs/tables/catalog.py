@@ -17,7 +17,7 @@ HEADS = ("group", "architectures", "controllable", "partially controllable", "un
 
 
 def table(catalog: Catalog | None = None) -> str:
-    """The Markdown table of how many architectures of each group have which verdict (default: of what is shipped)."""
+    """Return the Markdown table of architectures by group and verdict (default: of the shipped catalog)."""
     if catalog is None:
         catalog = Catalog((*load(), *load(group=SENSORS))) if shipped_folder().groups() else Catalog(())
     counts, total = catalog.count("group", "verdict"), catalog.count("verdict")

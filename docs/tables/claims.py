@@ -1,5 +1,5 @@
-"""Every word of certainty that the program prints: what it stands for, by which computation, on which assumptions, and
-the test that would fail if it were false.
+"""Words of certainty that the program prints: meaning, computation, assumptions, and the test that would fail if the
+claim were false.
 
 A test (``tests/test_claims.py``) goes through all texts in
 the code and all templates of pages: one that holds a word of certainty (:data:`CERTAIN`) and is covered neither by a
@@ -27,7 +27,7 @@ CERTAIN = re.compile(
 
 @dataclass(frozen=True)
 class Claim:
-    """One word or phrase: ``texts`` are patterns of the texts that say it, ``test`` is ``file::function``."""
+    """One word or phrase: ``texts`` are patterns of the texts that print it, ``test`` is ``file::function``."""
 
     phrase: str
     command: str
@@ -40,7 +40,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class NoClaim:
-    """Texts with such a word that claim nothing of a robot, and why not."""
+    """Texts with such a word that claim nothing about a robot, with the reason."""
 
     why: str
     texts: tuple[str, ...]
@@ -52,7 +52,7 @@ def _rows(kind: str) -> list[dict[str, Any]]:
 
 
 CLAIMS = tuple(Claim(**row) for row in _rows("claim"))
-"""What is claimed, in the order of the page."""
+"""Claims in the order of the page."""
 NO_CLAIMS = tuple(NoClaim(**row) for row in _rows("no_claim"))
 
 
@@ -77,7 +77,7 @@ def indent_lines(text: str) -> str:
 
 
 def page() -> str:
-    """The page of claims, Markdown."""
+    """Return the page of claims in Markdown."""
     lines = [*HEAD, ""]
     for claim in CLAIMS:
         lines += [

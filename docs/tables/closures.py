@@ -38,7 +38,7 @@ def table() -> str:
 def written_table() -> str:
     """Return the Markdown table of the formats that are written, and the programs that read their loops."""
     rows = []
-    for form in (each for each in writable() if each.name != "usd"):  # no program of the table was tried with USD
+    for form in (each for each in writable() if each.name != "usd"):  # no program of the table reads USD
         constructs = written_constructs(form.endings[0])
         readers = [each for each in PROGRAMS if all(CONSTRUCTS[name].get(each) == READ for name in constructs)]
         endings, names = (", ".join(f"`{each}`" for each in part) for part in (form.endings, constructs))

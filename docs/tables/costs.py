@@ -16,7 +16,7 @@ from .markdown import rewrite, table
 PAGE = Path(__file__).resolve().parents[1] / "pages" / "costs.md"
 START = "<!-- generated: costs -->"
 TIME_MAX_S = 120
-"""Processor seconds after which a command is stopped; the table then says that it takes longer."""
+"""Processor seconds after which a command is stopped; the table then has an inequality."""
 ROBOTS = {
     "rrrrr_m1": ("0.02", "-0.02"),
     "quattro": ("0.05", "-0.05"),

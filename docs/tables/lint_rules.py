@@ -10,7 +10,7 @@ START = "<!-- generated: rules -->"
 
 
 def table() -> str:
-    """The Markdown table of all rules, as they say it themselves."""
+    """Return the Markdown table of all rules, by their own descriptions."""
     rows = []
     for rule in lint_rules().values():
         advice = f"{rule.advice} (`--fix`)" if rule.fixable else rule.advice

@@ -10,18 +10,18 @@ END = "<!-- end -->"
 
 
 def line(cells: Iterable[object]) -> str:
-    """One row, its bars kept apart from those of the table."""
+    """Return one row, bars in cells escaped."""
     return "| " + " | ".join(str(cell).replace("|", "\\|") for cell in cells) + " |"
 
 
 def table(heads: Sequence[object], rows: Iterable[Iterable[object]], words: int | None = None) -> str:
-    """A table; behind the first columns of ``words`` (None: all are) stand numbers, flush right."""
+    """Return a table; columns after the first ``words`` (None: none) are numbers, flush right."""
     rules = ["---" if words is None or column < words else "---:" for column in range(len(heads))]
     return "".join(f"{line(cells)}\n" for cells in (heads, rules, *rows))
 
 
 def block(text: str, start: str) -> str:
-    """What stands between the marks; raises ``ValueError`` where they are not there."""
+    """Return the text between the marks; raise ``ValueError`` if they are missing."""
     match = _between(start).search(text)
     if match is None:
         raise ValueError(f"no {start} … {END}")
@@ -29,13 +29,13 @@ def block(text: str, start: str) -> str:
 
 
 def replace_between(text: str, made: str, start: str) -> str:
-    """The text with ``made`` between the marks."""
+    """Return the text with ``made`` between the marks."""
     block(text, start)
     return _between(start).sub(lambda match: match[1] + made + match[3], text)
 
 
 def rewrite(file: str | Path, tables: Mapping[str, Callable[[], str]]) -> None:
-    """Make those of the tables, by the marks before them, that a page has."""
+    """Write those tables, by the marks before them, that a page contains."""
     text = Path(file).read_text(encoding="utf-8")
     for start, make in tables.items():
         text = replace_between(text, make(), start) if start in text else text

@@ -13,11 +13,11 @@ from .markdown import table as markdown
 
 START = "<!-- generated: kinds -->"
 AT = ViewGeometry(np.zeros(3), np.array([0, 0, 1.0]), np.array([0.3, 0.2, 1.0]), unit((1, 2, 0.5)))
-"""Where a camera and a link may be: the words of chains do not depend on it."""
+"""Geometry of an example: the notation of chains does not depend on it."""
 
 
 def table() -> str:
-    """The Markdown table of all kinds, as they say it themselves."""
+    """Return the Markdown table of all kinds, by their own descriptions."""
     rows = []
     for word, kind in kinds().items():
         needs = ", ".join(f"`{name.rstrip('?')}`{' (optional)' * name.endswith('?')}" for name in kind.needs)
@@ -33,13 +33,13 @@ def table() -> str:
             )
         )
     return markdown(
-        ("kind", "measured", "attributes", "numbers", "virtual chain", "held, it transmits", "error in a servo loop"),
+        ("kind", "measured", "attributes", "numbers", "virtual chain", "fixed, it transmits", "error in a servo loop"),
         rows,
     )
 
 
 def chain_word(word: str) -> str:
-    """The word of a kind's virtual chain, its motors underlined."""
+    """Return the notation of a kind's virtual chain, its motors underlined."""
     kind = kinds()[word]
     if "joint" in kind.needs:
         return "the real joint, actuated"

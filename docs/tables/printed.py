@@ -1,4 +1,4 @@
-"""The tables of forms and of assembly modes that the papers print, beside those that are computed."""
+"""The tables of forms and of assembly modes that the papers print, with those that are computed."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ FORMS_HEADS = ("source", "real", "hidden, as printed", "robot", "legs", "derived
 
 
 def forms_table() -> str:
-    """The Markdown table of printed forms, each with the hidden robot that is derived."""
+    """Return the Markdown table of printed forms, each with the derived hidden robot."""
     return markdown(FORMS_HEADS, map(form_row, FORMS))
 
 
 def form_row(form: PrintedForm) -> tuple[str, ...]:
-    """One printed form's row."""
+    """Return the row of one printed form."""
     found = str(derive(load(list_robots()[form.robot]), form.legs, unchecked=False).hidden_architecture)
     same = any(found in (each, f"{found.partition('-')[0]}-{each}") for each in form.hidden)
     return (
@@ -43,17 +43,17 @@ def form_row(form: PrintedForm) -> tuple[str, ...]:
 
 @cache
 def compute_modes(claim: PrintedClaim) -> AssemblyModes:
-    """All modes with the directions that the claim's legs have at its desired pose."""
+    """Compute all modes with the directions that the claim's legs have at its desired pose."""
     return modes(load(list_robots()[claim.robot]), claim.legs, at=claim.at)
 
 
 def nearest(place: Place, found: AssemblyModes) -> AssemblyMode:
-    """The mode whose place is nearest to a printed one."""
+    """Return the mode nearest to a printed one."""
     return min(found.modes, key=lambda mode: math.dist(place, _place(mode)))
 
 
 def table() -> str:
-    """The Markdown table of all claims: each printed pose with the nearest mode, then the modes not printed."""
+    """Return the Markdown table of all claims: each printed pose with the nearest mode, then the modes not printed."""
     return markdown(HEADS, (row for claim in CLAIMS for row in _rows(claim)))
 
 
@@ -64,8 +64,8 @@ def _rows(claim: PrintedClaim) -> Iterator[tuple[str, ...]]:
     for each in claim.modes:
         mode = nearest(each.place, found)
         met.append(mode)
-        apart = 1e3 * math.dist(each.place, _place(mode))
-        yield (*head, ", ".join(f"{v:g}" for v in each.place), _write_place(mode), f"{apart:.0f} mm", each.remark)
+        distance = 1e3 * math.dist(each.place, _place(mode))
+        yield (*head, ", ".join(f"{v:g}" for v in each.place), _write_place(mode), f"{distance:.0f} mm", each.remark)
     for mode in found.modes:
         if mode not in met:
             reached = f"; legs {', '.join(mode.unclosed_legs)} do not reach it" if mode.reachable is False else ""
@@ -81,7 +81,7 @@ def _place(mode: AssemblyMode) -> Place:
 
 
 def _write_place(mode: AssemblyMode) -> str:
-    """A place to a tenth of a millimetre and the turn about z to a degree."""
+    """Return a position to a tenth of a millimetre and the rotation about z to a degree."""
     assert mode.pose.rpy is not None
     turn = round(math.degrees(mode.pose.rpy[2])) % 360
     return f"{', '.join(f'{round(v, 4) + 0.0:.4f}' for v in _place(mode))}; {turn}°"

@@ -1,4 +1,4 @@
-"""What the papers print: forms of hidden robots, and assembly modes with what is computed for each."""
+"""Forms of hidden robots and assembly modes that the papers print, each with a remark on the computed one."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Place = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class PrintedMode:
-    """A printed pose, and in one sentence what the robot's own geometry says of it."""
+    """A printed pose, and one sentence on its difference from the robot's geometry."""
 
     place: Place
     remark: str
@@ -19,7 +19,7 @@ class PrintedMode:
 
 @dataclass(frozen=True)
 class PrintedClaim:
-    """The modes printed for a robot of the families, the legs watched there and the desired pose."""
+    """The modes printed for a robot of the families, the observed legs and the desired pose."""
 
     source: str
     robot: str

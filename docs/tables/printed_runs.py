@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Replay:
-    """One run: where it is printed, the watched legs, start and goal, how it is said to end, what is printed of it, and
-    a word on what is computed; λ (1/s) and the noise. Runs of one ``order`` are ranked by their errors as printed in
-    ``place`` (1: the best; equal places: about the same)."""
+    """A printed run: source, observed legs, start and goal, printed outcome and figures (``said``), and a remark on the
+    computed ones; λ (1/s) and the noise. Runs of one ``order`` are ranked by their errors as printed in ``place`` (1:
+    the best; equal places: about the same)."""
 
     source: str
     robot: str

@@ -1,4 +1,4 @@
-"""The table of servo runs that the papers print, beside what the same runs do here."""
+"""The table of servo runs that the papers print, with the same runs computed here."""
 
 from __future__ import annotations
 
@@ -25,23 +25,22 @@ HEADS = (
     "noise",
     "printed",
     "computed",
-    "same ending?",
+    "same outcome?",
     "printed : computed",
     "bound",
-    "word",
+    "remark",
 )
 BENCH_LASTS = 8.0
-"""Time constants 1 / λ of a run on the physics bench."""
+"""Time constants 1 / λ of a run with dynamics."""
 DRAWS = 4
-"""Draws of the noise over which errors of runs without dynamics that are ranked are taken together: those of one
-differ by a third."""
+"""Noise samples over which errors of ranked runs without dynamics are averaged: single ones differ by a third."""
 ALIKE = 1.5
 """Ratio of root mean square errors up to which two accuracies are about the same."""
 
 
 @cache
 def compute_run(replay: Replay, seed: int = 0) -> Servo:
-    """The run with one draw of the noise."""
+    """Run a replay with one noise sample."""
     return servo(
         load(list_robots()[replay.robot]),
         replay.legs,
@@ -49,19 +48,19 @@ def compute_run(replay: Replay, seed: int = 0) -> Servo:
         goal=replay.way[1],
         gain=replay.gain,
         noise=replay.noise,
-        dynamics=replay.physics,
-        time=BENCH_LASTS / replay.gain if replay.physics else None,
+        dynamics=replay.dynamics,
+        time=BENCH_LASTS / replay.gain if replay.dynamics else None,
         seed=seed,
     )
 
 
 def table(replays: Sequence[Replay] = REPLAYS) -> str:
-    """The Markdown table of all replays."""
+    """Return the Markdown table of all replays."""
     return markdown(HEADS, map(row, replays))
 
 
 def row(replay: Replay) -> tuple[str, ...]:
-    """One run's row."""
+    """Return the row of one run."""
     found = compute_run(replay)
     here = found.outcome
     if found.spread is not None:
@@ -90,11 +89,11 @@ def row(replay: Replay) -> tuple[str, ...]:
 
 
 def _figures(replay: Replay, found: Servo) -> str:
-    """How the figures compare: the distance of two places, or the ratios of errors and their order."""
+    """Compare printed and computed figures: distance of two positions, or ratios of errors and their order."""
     if found.spread is None:
         printed = [float(v) for v in replay.said.strip("()").replace("−", "-").split(",")]
-        apart = math.dist(printed, [v or 0.0 for v in (found.pose.x, found.pose.y, found.pose.z)])
-        return f"{1e3 * apart:.0f} mm apart"
+        distance = math.dist(printed, [v or 0.0 for v in (found.pose.x, found.pose.y, found.pose.z)])
+        return f"{1e3 * distance:.0f} mm"
     ratios = [
         f"{theirs / mine:.2g} ({unit})"
         for theirs, mine, unit in zip(replay.printed, _error(replay), ("position", "orientation"), strict=True)
@@ -106,7 +105,7 @@ def _figures(replay: Replay, found: Servo) -> str:
 
 
 def _in_order(replay: Replay) -> bool:
-    """Whether the errors of position rank as printed."""
+    """Return True if the errors of position rank as printed."""
     mine, _ = _error(replay)
     for other in REPLAYS:
         if other.order != replay.order or other is replay:
@@ -122,7 +121,7 @@ def _in_order(replay: Replay) -> bool:
 
 
 def _bound(replay: Replay) -> str:
-    """The largest error that directions within a cone of the printed noise can cause at the goal, to first order."""
+    """Return the largest first-order error at the goal for directions within a cone of the printed noise."""
     if replay.noise is None or "deg" not in replay.noise:
         return "–"
     found = accuracy(load(list_robots()[replay.robot]), replay.legs, cone=replay.noise, at=replay.way[1]).poses[0]
@@ -131,8 +130,8 @@ def _bound(replay: Replay) -> str:
 
 
 def _error(replay: Replay) -> tuple[float, float]:
-    """The root mean square error of all draws together (m, rad)."""
-    draws = DRAWS if replay.order and not replay.physics else 1
+    """Return the root mean square error of all noise samples (m, rad)."""
+    draws = DRAWS if replay.order and not replay.dynamics else 1
     spreads = [compute_run(replay, seed).spread for seed in range(draws)]
     squares = [(each.rms_metres**2, each.rms_radians**2) for each in spreads if each is not None]
     metres, radians = np.sqrt(np.mean(squares, axis=0))

@@ -16,12 +16,12 @@ HEADS = (
     "robot",
     "architecture",
     "dof",
-    "hidden robot, all legs watched",
+    "hidden robot, all legs observed",
     "verdict",
     "exact",
-    "lost",
+    "unobserved",
     "smallest leg sets",
-    "Type 2 singularities, all legs watched",
+    "Type 2 singularities, all legs observed",
 )
 POINTS = 200
 """Random poses at which the condition in words is checked before it is printed."""
@@ -30,11 +30,11 @@ _LONGEST_LIST = 4
 
 
 def row(name: str) -> tuple[str, ...]:
-    """One shipped robot's row: no number in it that a rounding error can change."""
+    """Return the row of a shipped robot, without numbers that a rounding error can change."""
     mechanism = load(list_robots()[name])
     found, sets = derive(mechanism), legs(mechanism)
     hidden = found.hidden_architecture
-    lost = "; ".join(freedom.name for freedom in found.verdict.unobserved)
+    unobserved = "; ".join(twist.name for twist in found.verdict.unobserved)
     smallest = "–" if hidden is None else _smallest(sets.minimal)
     exact = (
         "not decided"
@@ -51,19 +51,19 @@ def row(name: str) -> tuple[str, ...]:
         str(hidden) if hidden else "none",
         found.verdict.verdict,
         exact,
-        lost or "–",
+        unobserved or "–",
         smallest,
         words,
     )
 
 
 def table(names: Iterable[str] | None = None) -> str:
-    """The Markdown table of the shipped robots (default: all)."""
+    """Return the Markdown table of the shipped robots (default: all)."""
     return markdown(HEADS, map(row, list_robots() if names is None else names))
 
 
 def _smallest(sets: Sequence[Sequence[str]]) -> str:
-    """The smallest sets; where there are many, the first and their number."""
+    """Return the smallest sets; of many, the first and their number."""
     shown = ["{" + ", ".join(each) + "}" for each in sets[:_LONGEST_LIST]]
     if len(sets) > _LONGEST_LIST:
         return f"{shown[0]} and {len(sets) - 1} more"

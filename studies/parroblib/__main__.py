@@ -89,7 +89,7 @@ def parser() -> argparse.ArgumentParser:
     three.set_defaults(run=write_robot)
     three.add_argument("tables")
     three.add_argument("name", help="such as P4RPRRR8V1G1P3")
-    three.add_argument("-o", "--output", required=True, help=".urdf, or another dialect")
+    three.add_argument("-o", "--output", required=True, help=".urdf, or another format")
     return found
 
 

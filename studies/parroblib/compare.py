@@ -15,18 +15,18 @@ from .prime_field import NotExact
 from .study import Studied, motor_choices
 from .tables import Held, MotorChoice, PublishedRobot
 
-MORE, SHAKY, UNMOVED = "more freedoms", "more freedoms to first order", "not found to move so"
-UNCOUNTED, LARGER, SMALLER = "freedoms that are not counted", "loses more", "loses less"
+MORE, SHAKY, UNMOVED = "more dof", "more dof to first order", "not found to move so"
+UNCOUNTED, LARGER, SMALLER = "dof that are not counted", "loses more", "loses less"
 FEWER, FURTHER = "fewer choices work", "more choices work"
 CLASSES = {
-    MORE: "the platform can leave the stated motion: it has more freedoms than the table says",
+    MORE: "the platform can leave the stated motion: it has more dof than the table states",
     SHAKY: "the same to first order everywhere in the stated motion, but it was not followed out of it",
     UNMOVED: "no configuration with the stated motion was found at random dimensions",
-    UNCOUNTED: "the loss that is stated counts the stated motion only: the platform keeps other freedoms",
-    LARGER: "with these motors held the platform keeps more of the stated motion than the table says",
-    SMALLER: "it keeps less: the motors determine more than the table says",
-    FEWER: "fewer choices of motors hold the stated motion than the table says",
-    FURTHER: "more choices of motors hold the stated motion than the table says",
+    UNCOUNTED: "the loss that is stated counts the stated motion only: the platform keeps other dof",
+    LARGER: "with these motors held the platform keeps more of the stated motion than the table states",
+    SMALLER: "it keeps less: the motors determine more than the table states",
+    FEWER: "fewer choices of motors hold the stated motion than the table states",
+    FURTHER: "more choices of motors hold the stated motion than the table states",
 }
 """The kinds of disagreement."""
 MODULAR, LEGS, SYMMETRIC = "modulo primes", "modulo primes, leg by leg", "modulo primes, symmetric"
@@ -34,7 +34,7 @@ NUMBERS, OPEN = "numbers", "open"
 SETTLED = {
     MODULAR: "our figure, by ranks at a random closed configuration modulo two primes",
     LEGS: "our figure, by ranks of the single legs modulo two primes: all translations, and the turns that all have "
-    "in common; of a loss: the platform has more freedoms than there are motors",
+    "in common; of a loss: the platform has more dof than there are motors",
     SYMMETRIC: "our figure, by the same ranks at a symmetric configuration; losses can only be smaller elsewhere",
     NUMBERS: "our figure, by ranks of numbers with their gap, at two configurations of generic dimensions",
     OPEN: "not settled",

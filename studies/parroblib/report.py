@@ -21,7 +21,7 @@ def describe_audit(record: Mapping[str, Any]) -> str:
         for each in group["watching"]
     ]
     if sights:
-        parts.append(table(sights, ("group", "watching all legs", "fewest legs that show as much", "robots")))
+        parts.append(table(sights, ("group", "observing all legs", "fewest legs with the same rank", "robots")))
     kinds = list(_kinds(record["groups"]))
     if kinds:
         used = {settled for _, _, settled, _ in kinds}
@@ -74,7 +74,7 @@ def _group(each: Mapping[str, Any]) -> tuple[str, ...]:
 
 def _legend(record: Mapping[str, Any]) -> str:
     rows = [
-        ("moves so", "robots whose platform has the stated freedoms and no others; further: more of them"),
+        ("moves so", "robots whose platform has the stated dof and no others; further: more of them"),
         (
             "losses",
             "choices of motors with a stated loss of rank; agree: it is the platform's; in stated: it is "

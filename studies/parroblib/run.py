@@ -115,12 +115,12 @@ def audit(
     """Compare published tables with what is computed here.
 
     ``only`` one group, ``sample`` robots of each, drawn with ``seed``; records are ``kept`` in a file, a line each,
-    from which the same question goes on.
+    from which the same study continues.
 
     Raises
     ------
     BadRequest
-        For a folder without tables, a group that they do not have, a file of another question.
+        For a folder without tables, a group that they do not have, a file of another study.
     """
     tables = read(folder)
     groups = sorted({robot.group for robot in tables.robots} | {group for group, *_ in tables.no_chain})
@@ -180,7 +180,7 @@ class _Kept:
         try:
             lines = Path(path).read_text().splitlines(keepends=True) if Path(path).exists() else []
             if lines and lines[0].strip() != first:
-                raise BadRequest("records of another question", str(path), "a new file")
+                raise BadRequest("records of another study", str(path), "a new file")
             whole = [line for line in lines[1:] if line.endswith("\n")]
             for line in whole:
                 record = json.loads(line)

@@ -1,7 +1,7 @@
 """Published tables of symmetric parallel robots, read: leg chains, robots, their motors, what a synthesis found.
 
-The format is told in README.md. A table may lack columns at its end, and figures that it states may be empty:
-what is not stated is None. What cannot be read, contradicts itself or is told twice is a
+The format is described in README.md. A table may lack columns at its end, and figures that it states may be empty:
+what is not stated is None. What cannot be read, contradicts itself or occurs twice is a
 :class:`~hrsynth.errors.Defect` with its file and line, and the rows that need it are left out.
 """
 
@@ -172,7 +172,7 @@ class _Once:
     def new(self, path: Path, line: int, name: str, *key: object) -> bool:
         """Whether what a row says was not said before."""
         if key in self._where:
-            self.defects.append(Defect(str(path), line, f"told before, in {self._where[key]}", cell_text(name)))
+            self.defects.append(Defect(str(path), line, f"repeated: first in {self._where[key]}", cell_text(name)))
             return False
         self._where[key] = f"{path.name}:{line}"
         return True

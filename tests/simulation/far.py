@@ -41,7 +41,7 @@ from simulation.listed import MEMBER, Listed, Lists, random_sets
 from simulation.scenes import CONTROLLABLE, Legs, far_pairs, setting
 from tables.markdown import replace_between, table
 
-START, MEMBERS = "<!-- generated: endings -->", "<!-- generated: members -->"
+START, MEMBERS = "<!-- generated: outcomes -->", "<!-- generated: members -->"
 OF_ONE_SET = 3
 """Runs with one random set of legs."""
 AT_ONCE = 25

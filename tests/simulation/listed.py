@@ -29,7 +29,7 @@ from hrsynth.tolerances import CRITICAL as AT_ZERO
 from hrsynth.tolerances import CRITICAL_FLAT, SAME_ENDING
 from simulation.scenes import Legs, setting
 
-SINGULAR, CONTINUUM, APART, OUTSIDE = "singular", "continuum", "apart", "outside"
+SINGULAR, CONTINUUM, APART, OUTSIDE = "singular", "family", "apart", "outside"
 MEMBER = (GOAL, MODE, ANTIPODAL, CRITICAL, SINGULAR, BOUNDARY, CONTINUUM, APART, OUTSIDE)
 """What a run ended at: a rest of that kind where all velocities are seen; a singular one, or one at a leg's reach; one
 of those that fill curves; ``apart``: a run to a boundary, or without an ending, that is none of these; ``outside``:

@@ -187,8 +187,8 @@ def test_every_disagreement_is_told_and_settled(tables: Path):
     told = {(each["robot"], each["kind"]): (each["theirs"], each["ours"]) for each in found["disagreements"]}
     assert told == {
         ("P3PRP1G1P1A2", "loses more"): ("0", "2"),
-        ("P3RRPRR1G1P1", "more freedoms"): ("3T0R", "3T1R"),
-        ("P3RRPRR1G1P1A1", "freedoms that are not counted"): ("0", "1 (0 stated)"),
+        ("P3RRPRR1G1P1", "more dof"): ("3T0R", "3T1R"),
+        ("P3RRPRR1G1P1A1", "dof that are not counted"): ("0", "1 (0 stated)"),
     }
     assert {each["settled"] for each in found["disagreements"]} <= {"modulo primes", "modulo primes, leg by leg"}
     assert all(":" in each["at"] for each in found["disagreements"])
@@ -269,7 +269,7 @@ DRIVEN = "sym_2T1R;P3RRR1G1P1A2;0;1;0;0;1;0;0;1;0;"
         (LIST, None, f"P3RRR1G{NINES}P1", 4, "not the name of a robot"),
         (LIST, None, "\0\0;x", 4, r"got '\x00\x00'"),
         (LIST, None, b"x\xe4;", 4, "not UTF-8"),
-        (LIST, None, "P3RRR1G1P1;S3RRR1", 4, "told before, in sym_2T1R_list.csv:2"),
+        (LIST, None, "P3RRR1G1P1;S3RRR1", 4, "repeated: first in sym_2T1R_list.csv:2"),
         (LIST, None, "P3RRR1G1P2;S3PRP1", 4, "the chain of P3RRR1G1P2 is not that of its name"),
         (LIST, "Name;Chain;Joints\n", "", 1, "a row where a head line should be"),
         (LIST, "P3", "x\u2028y\nP3", 2, "not the name of a robot"),
@@ -287,18 +287,18 @@ DRIVEN = "sym_2T1R;P3RRR1G1P1A2;0;1;0;0;1;0;0;1;0;"
             None,
             "S3RRR1;R;0;0;0;0;q1;d1;0;R;0;0;0;a2;q2;d2;0;R;0;0;0;a3;q3;d3;0",
             4,
-            "told before, in S3RRR.csv:3",
+            "repeated: first in S3RRR.csv:3",
         ),
         (MOTORS, None, DRIVEN + "\u00b2;", 8, "the loss of rank is not a whole number"),
         (MOTORS, None, DRIVEN + NINES, 8, "the loss of rank is not a whole number"),
         (MOTORS, None, DRIVEN.replace("A2", "A" + NINES), 8, "no choice of motors"),
         (MOTORS, None, DRIVEN.replace(";0;1;0;", ";;1;0;", 1), 8, "not 3 × 3 joints"),
-        (MOTORS, None, DRIVEN.replace("A2", "A1") + "0;", 8, "told before, in actuation.csv:1"),
+        (MOTORS, None, DRIVEN.replace("A2", "A1") + "0;", 8, "repeated: first in actuation.csv:1"),
         (MOTORS, None, DRIVEN.replace("G1P1", "G2P1") + "0;", 8, "of a robot that its group does not list"),
         (TRIED, None, "S3RRR1;3;2;1;\u00b2;2", 4, "not a whole number"),
         (TRIED, None, "S3RRR1;3;2;1;0;two", 4, "not a whole number"),
         (TRIED, None, f"S3RRR1;3;2;1;0;{NINES}", 4, "not a whole number"),
-        (TRIED, None, "S3RRR1;3;1;1;0;3", 4, "told before, in 2T1R.csv:2"),
+        (TRIED, None, "S3RRR1;3;1;1;0;3", 4, "repeated: first in 2T1R.csv:2"),
     ],
     ids=lambda value: ascii(value)[:24] if isinstance(value, str | bytes) else None,
 )
@@ -386,7 +386,7 @@ def test_a_broken_audit_goes_on_with_the_same_bytes(tables: Path, tmp_path: Path
     audit(tables, kept=broken, only="2T1R", tell=lambda _, done, total: told.append((done, total)))
     assert broken.read_bytes() == whole.read_bytes()
     assert told[-1] == (2, 2)
-    with pytest.raises(BadRequest, match="another question"):
+    with pytest.raises(BadRequest, match="another study"):
         audit(tables, kept=whole, only="2T1R", seed=1)
 
 
@@ -401,7 +401,7 @@ def test_the_command_line(tables: Path, tmp_path: Path, capsys: pytest.CaptureFi
         file.write("\nP3XYZ;S3RRR1\n")
     assert main(["audit", str(broken), "--only", "2T1R"]) == 0
     out, err = capsys.readouterr()
-    assert re.search(r"^parroblib: .*sym_2T1R_list.csv:\d+: not the name of a robot, found P3XYZ", err, re.MULTILINE)
+    assert re.search(r"^parroblib: .*sym_2T1R_list.csv:\d+: not the name of a robot: got P3XYZ", err, re.MULTILINE)
     assert out.splitlines()[-3].startswith("left out: 1 line of the tables, ")
     for arguments, said in (
         ([str(tmp_path / "none")], "no folder of tables"),

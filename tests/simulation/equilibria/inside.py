@@ -1,5 +1,5 @@
 """How many random starts inside what is certified end at the goal, and what part of the goal's basin that is, for the
-table in studies/endings/README.md: PYTHONPATH=src:tests python -m simulation.equilibria.inside quattro:1,4 delta: …
+table in studies/equilibria/README.md: PYTHONPATH=src:tests python -m simulation.equilibria.inside quattro:1,4 delta: …
 
 Runs are followed abreast; the basin is that of starts drawn in all that the legs reach, in the goal's working mode.
 """

@@ -38,7 +38,8 @@ COUNTS = (
 )
 WHOLE = (("3rpr_m1", None), ("rrrrr_m1", None), ("3rrr_m1", None), ("quattro", "1,4"), ("quattro", "2,3"))
 """The robots and legs whose lists hold all ends that were seen."""
-MEMBER, CONTINUUM, MODE, NONE, OUTSIDE = "member", "of a continuum", "another mode", "no rest", "outside"
+MEMBER, CONTINUUM, MODE = "member", "of a continuous family", "another operation mode"
+NONE, OUTSIDE = "no equilibrium", "outside"
 X, Y, Z = np.eye(3)
 MOTIONS: dict[str, tuple[Array, Array]] = {
     "3rpr_m1": (np.array([X, Y]), Z[None]),
