@@ -303,7 +303,7 @@ OUTPUTS = {
         ),
     ),
     "equilibria": Outputs(
-        "text.endings:endings",
+        "text.equilibria:endings",
         (
             File(
                 "cannot draw the endings",
@@ -356,7 +356,7 @@ OUTPUTS = {
                 "Draw the run: curves (run.png, .pdf, .svg) or an animation (run.gif).",
                 allowed=".png, .pdf, .svg (curves) or .gif (camera view)",
                 drawn=True,
-                installed=(".gif", ".simulation.pictures:drawing"),
+                installed=(".gif", ".simulation.rendered_images:drawing"),
                 limited=((".gif",), "animations:require_legs"),
                 plotted=(*FIGURES, ".gif"),
             ),

@@ -305,7 +305,7 @@ def test_the_command_and_the_line_of_python_give_what_the_panel_shows(
         if what in ("open", "watch"):
             verdict = ask("watch", robot, **fields)
             assert record["verdict"] == verdict["verdict"]["words"]
-            assert [each["name"] for each in record["lost"]] == [each["words"] for each in verdict["lost"]]
+            assert [each["name"] for each in record["unobserved"]] == [each["words"] for each in verdict["lost"]]
         elif what == "modes":
             assert len(record["modes"]) == len(found["modes"])
         elif what == "aspects":
@@ -316,7 +316,7 @@ def test_the_command_and_the_line_of_python_give_what_the_panel_shows(
         elif what == "answer":
             assert found["watch"] in record["minimal"]
         else:
-            assert record["ended"] == found["kind"]
+            assert record["outcome"] == found["kind"]
 
 
 def run(command: str, capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from ...kinematics.pinocchio_model import PinocchioModel
 from ...kinematics.platform_motion import PoseTask
 from ...kinematics.tasks import PoseAndValuesTask, solve, system
 from ...mechanism import Mechanism
-from ...records import Number, Recorded, Shown
+from ...records import As, Number, Recorded, Shown
 from ...results import Value
 from ...tolerances import FOLLOWED, SOLVED
 from .scale import error
@@ -63,13 +63,13 @@ class ViewState(Value):
 @dataclass(frozen=True, eq=False, repr=False)
 class Slider(Value):
     """One freedom of the platform: its coordinate's values (n,) in metres or radians, the state at each of them, and
-    which of them is home."""
+    the index of the zero configuration."""
 
     name: Recorded[str]
     unit: Recorded[str]
     values: Recorded[tuple[float, ...]]
     states: tuple[ViewState, ...]
-    home: Recorded[int]
+    home: Annotated[int, As("zero_configuration"), "index of the value at the zero configuration"]
 
     distances = Shown(list[Number], lambda self: [state.distance for state in self.states])
 
