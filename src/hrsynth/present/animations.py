@@ -41,7 +41,7 @@ AFTER = 3
 """Pictures during which a crossing is told."""
 SHADES = 32
 """Colours of the file."""
-WATCHED = np.array([int(palette.colour("watched")[i : i + 2], 16) / 255 for i in (1, 3, 5)])
+WATCHED = np.array([int(palette.colour("observed")[i : i + 2], 16) / 255 for i in (1, 3, 5)])
 LINE = 38
 """Letters of a line of words."""
 
@@ -127,7 +127,7 @@ class Sheet:
         figure.text(left, 0.945, found.setup.robot.name, fontsize=17, fontweight="bold", va="center")
         figure.text(left, 0.895, f"from {pose_words(found.start)}\nto {pose_words(found.goal)}", fontsize=9, va="top")
         self.words = figure.text(left, 0.79, "", fontsize=14, va="top", linespacing=1.35)
-        figure.text(left, 0.53, "■", fontsize=11, va="center", color=palette.colour("watched"))
+        figure.text(left, 0.53, "■", fontsize=11, va="center", color=palette.colour("observed"))
         figure.text(left + 0.016, 0.53, name_all("leg", found.setup.labels), fontsize=10, va="center")
         self.marks: list[Any] = []
         for bottom, values, label in (

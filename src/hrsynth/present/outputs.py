@@ -113,7 +113,7 @@ class File:
         if path is not None and self.limited is not None and Path(path).suffix.lower() in self.limited[0]:
             from ..analysis.observed import ObservedRobot
 
-            watched = {name: asked[name] for name in ("observe", "camera", "see", "seed") if name in asked}
+            watched = {name: asked[name] for name in ("observe", "camera", "sensor", "seed") if name in asked}
             function(self.limited[1])(ObservedRobot.of(robot, **watched), **{name: asked[name] for name in self.takes})
 
     def question_fields(self, path: str | None) -> dict[str, str]:

@@ -21,7 +21,7 @@ TRAVEL = 0.3
 """Half of a rail that is drawn (characteristic lengths)."""
 SEEN = "seen"
 """A link whose direction is watched."""
-STROKES = {BASE: (PAGE["edge"], 2.0), LEG: (PAGE["soft"], 3.0), PLATFORM: (svg.INK, 3.4), SEEN: (svg.WATCHED, 4.6)}
+STROKES = {BASE: (PAGE["edge"], 2.0), LEG: (PAGE["soft"], 3.0), PLATFORM: (svg.INK, 3.4), SEEN: (svg.OBSERVED, 4.6)}
 """Colour and width of what a link is (pixels at the full size of a drawing)."""
 FILLS = {BASE: PAGE["ground"], PLATFORM: PAGE["line"]}
 

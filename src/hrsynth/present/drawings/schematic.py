@@ -149,7 +149,7 @@ def _scheme(drawn: Layout, name: str) -> str:
         *_bands(drawn, scale),
         *_ends(drawn, scale),
         _links(drawn, scale),
-        svg.element("path", d=heads, fill=svg.WATCHED) if heads else "",
+        svg.element("path", d=heads, fill=svg.OBSERVED) if heads else "",
         svg.element("g", *(_symbol(spot, scale) for spot in drawn.spots), stroke=svg.INK, stroke_width=1.6),
     )
 
@@ -190,7 +190,7 @@ def _links(drawn: Layout, scale: Scale) -> str:
     plain = [_net(net, scale) for net in drawn.nets if net.link not in drawn.observed]
     seen = [_net(net, scale) for net in drawn.nets if net.link in drawn.observed]
     return svg.element("g", *plain, fill="none", stroke=svg.INK, stroke_width=2, stroke_linejoin="round") + svg.element(
-        "g", *seen, fill="none", stroke=svg.WATCHED, stroke_width=4, class_="observed"
+        "g", *seen, fill="none", stroke=svg.OBSERVED, stroke_width=4, class_="observed"
     )
 
 
@@ -248,7 +248,7 @@ def _ends(drawn: Layout, scale: Scale) -> list[str]:
             continue
         (x, upper), (_, lower) = (scale.at(net.bar[0], lane) for lane in net.bar[1:])
         upper, lower = upper - 16, lower + 16
-        colour = svg.WATCHED if net.link in drawn.observed else svg.INK
+        colour = svg.OBSERVED if net.link in drawn.observed else svg.INK
         found.append(svg.element("path", d=svg.lines([[(x, upper), (x, lower)]]), stroke=colour, stroke_width=5))
         if net.link == base:
             strokes = [[(x, y), (x - 6, y + 6)] for y in range(int(upper), int(lower), 7)]

@@ -9,7 +9,7 @@ from ...characters import name_steering
 from ..palette import PAGE, colour, tint
 
 INK, EMPTY = PAGE["ink"], PAGE["face"]
-MOTOR, VIRTUAL, WATCHED = colour("motor"), colour("actuator"), colour("watched")
+MOTOR, VIRTUAL, OBSERVED = colour("motor"), colour("actuator"), colour("observed")
 """What a real motor drives (MMT Table 1), virtual actuators, observed segments."""
 STROKES = {"joint": INK, "motor": MOTOR, "virtual": VIRTUAL}
 FILLS = {"joint": EMPTY, "motor": tint(MOTOR), "virtual": tint(VIRTUAL)}

@@ -180,8 +180,8 @@ function line(points, radius, look) {
 
 /* What sensors see, as each kind draws itself: lines, and see-through polygons that the view does not fit itself to. */
 function sights(records, radius) {
-  const look = material(Colours.of("watched"));
-  const sheer = new THREE.MeshBasicMaterial({ color: Colours.of("watched"), ...BEHIND, opacity: 0.22, side: THREE.DoubleSide });
+  const look = material(Colours.of("observed"));
+  const sheer = new THREE.MeshBasicMaterial({ color: Colours.of("observed"), ...BEHIND, opacity: 0.22, side: THREE.DoubleSide });
   return records.flatMap(({ lines, areas }) => [
     ...lines.map((each) => each.length > 1 ? line(each.map(vector), 0.3 * radius, look) : new THREE.Group()),
     ...areas.map((each) => {

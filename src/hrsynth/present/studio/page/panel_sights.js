@@ -20,7 +20,7 @@ class SightsPanel extends Panel {
   moved({ state }) { this.pictures.forEach((each, i) => this.draw(each, (state.sights ?? []).filter(({ camera, image }) => camera === i && image.length))); }
 
   draw({ name, canvas, scale }, sights) {
-    const { width, height } = canvas, pen = canvas.getContext("2d"), colour = Colours.of("watched");
+    const { width, height } = canvas, pen = canvas.getContext("2d"), colour = Colours.of("observed");
     const place = ([x, y]) => [width / 2 + scale * x, height / 2 + scale * y];
     pen.clearRect(0, 0, width, height);
     Object.assign(pen, { strokeStyle: Colours.of("leg"), lineWidth: 1 });

@@ -100,7 +100,7 @@ class Direction {
     this.record = record;
     this.group = new THREE.Group();
     this.make = (watched) => {
-      const ends = record.ends.map(vector), colour = Colours.of(watched ? "watched" : "unwatched");
+      const ends = record.ends.map(vector), colour = Colours.of(watched ? "observed" : "unobserved");
       const name = label(record.leg, colour, (watched ? 0.14 : 0.11) * length);
       name.position.copy(ends[1]).lerp(ends[0], 0.85);
       const look = material(colour, watched ? {} : { transparent: true, opacity: 0.75 });

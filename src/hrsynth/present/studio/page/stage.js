@@ -248,8 +248,8 @@ return class Stage {
     const roles = new Set(shown.flatMap((each) => [...each.roles()]));
     const keys = ["base", "leg", "joint", "motor", "virtual", "actuator"].filter((role) => roles.has(role));
     const seen = this.arrows.filter(({ group }) => group.visible);
-    if (seen.some(({ watched }) => watched) || this.parts.sights.children.length) keys.push("watched");
-    if (seen.some(({ watched }) => !watched)) keys.push("unwatched");
+    if (seen.some(({ watched }) => watched) || this.parts.sights.children.length) keys.push("observed");
+    if (seen.some(({ watched }) => !watched)) keys.push("unobserved");
     if (this.parts.ghosts.children.some(({ visible }) => visible)) keys.push("mode");
     if (this.parts.goal.children.length) keys.push("goal");
     if (shown.length) keys.push("frame");
@@ -264,7 +264,7 @@ return class Stage {
   /* What a colour means here: the scale with its thresholds, the ellipsoid with how large it is drawn. */
   words(key) {
     const { names, edges, unit } = this.record.scale ?? {};
-    if (key === "watched" && this.parts.sights.children.length) return "what is observed, and cameras";
+    if (key === "observed" && this.parts.sights.children.length) return "what is observed, and cameras";
     if (key === "ellipsoid") return `${Colours.words(key)} for 0.1°${this.factor > 1 ? `, drawn ${this.factor} times as large` : ""}`;
     if (!names || !key.startsWith("step")) return Colours.words(key);
     const step = Number(key.slice(4)), sign = unit === "deg" ? "°" : ` ${unit}`, { falling, steps } = this.sheet?.record ?? {};
