@@ -122,7 +122,7 @@ def test_a_finger_picks_a_leg_beside_which_it_comes_down(browser: Any, tmp_path:
 
 def test_a_mode_that_is_clicked_is_told_by_its_label(open_page):
     tab = open_page("quattro")
-    ask(tab, "window.told = []; stage.onghost = (label) => told.push(label); 0")
+    ask(tab, "stage.ghosts(scene.ghosts); window.told = []; stage.onghost = (label) => told.push(label); 0")
     names = ask(
         tab,
         """stage.parts.ghosts.children.map((group) => [...group.children].find((each) => each.isSprite))
@@ -421,7 +421,7 @@ def test_without_webgl_one_line_says_so_and_the_words_stay(tab: Tab, tmp_path: P
     ask(tab, NAMES)
     assert "WebGL" in tab.page.locator(".stage [role=alert]").inner_text()
     tab.page.locator("aside input[type=range]").first.press("ArrowLeft")
-    tab.page.get_by_role("button", name="Home").click()
+    tab.page.get_by_role("button", name="Zero configuration").click()
     ask(tab, "stage.layout('beside'); stage.gizmo(true); stage.lost([{twist: [1, 0, 0, 0, 0, 0], point: [0, 0, 0]}])")
     assert ask(tab, "stage.picture()") is None
     assert "virtual actuator" in tab.page.locator("body").inner_text()

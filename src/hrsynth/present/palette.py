@@ -44,7 +44,7 @@ PAGE = {
     "wrong": "#a3123a",
     "notice": "#fff3d6",
 }
-"""Text, lines and backgrounds of pages and drawings; pressed or selected elements; good, partly good and bad results."""
+"""Text, lines and backgrounds of pages and drawings; pressed and selected elements; good, partial and bad results."""
 SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Colours of curves without a meaning, in the order of the style of all plots."""
 TINT = 0.4

@@ -119,8 +119,8 @@ def leg_svg(
 
 
 def derivation_svg(found: Derivation) -> bytes:
-    """The schemes of both robots side by side, the architecture over each; the real one alone where every leg is
-    blind."""
+    """The schemes of both robots side by side, the architecture over each; the real one alone if every
+    direction is constant."""
     watched = [o.link for o in found.setup.observed]
     schemes = [(f"real robot  {found.architecture}", robot_svg(found.setup.decomposition, observed=watched))]
     if found.hidden is not None:
@@ -155,7 +155,7 @@ def _scheme(drawn: Layout, name: str) -> str:
 
 
 def _describe(drawn: Layout) -> str:
-    """The drawing in words: each group's boxes in order, what is driven, what is observed."""
+    """The drawing in words: each group's boxes in order, the motors, the observed links."""
     sentences = []
     for number, row in enumerate(drawn.rows):
         own = sorted((spot for spot in drawn.spots if spot.row == number), key=lambda spot: (spot.lane, spot.x))

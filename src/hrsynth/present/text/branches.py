@@ -47,7 +47,9 @@ def _back(found: BranchProof) -> Rows:
         return []
     rows: Rows = [("", "")]
     if found.injective_box is None:
-        rows.append(("inverse map", "undecided: motor positions for a pose are found, others in the box may give the same pose"))
+        rows.append(
+            ("inverse map", "undecided: motor positions for a pose are found, others in the box may give the same pose")
+        )
     else:
         (low, high), (least, most) = found.injective_box, found.proved
         whole = bool((low == least).all() and (high == most).all())

@@ -108,7 +108,10 @@ def facts(record: Record, smallest: Sequence[Record] = ()) -> Iterable[tuple[str
     if "refused" in record:
         yield "refused", str(record["refused"])
         return
-    yield "dof", f"{record['dof']}, {record['motion']} (mobility {record['mobility']}, of which {record['idle']} internal)"
+    yield (
+        "dof",
+        f"{record['dof']}, {record['motion']} (mobility {record['mobility']}, of which {record['idle']} internal)",
+    )
     yield "hidden robot", str(record.get("hidden", "none"))
     yield "verdict", f"{record['verdict']} (rank {record['rank']} of {record['dof']})"
     if record["exact"]:

@@ -102,8 +102,8 @@ def _complete(found: Equilibria) -> list[str]:
         else f"with each coordinate of the point within {told.within:.3g} m of that at the goal"
     )
     if told.result.struts is not None:
-        where += f", for platforms that translate, in {'the only orientation' if turns == 1 else f'all {turns} orientations'}"
-        where += " with this motion"
+        where += f", while the platform translates, in "
+        where += f"{'the only orientation' if turns == 1 else f'all {turns} orientations'} in which it can"
     else:
         where += _turned(found)
     where += "" if told.shorter is None else f", no rod shorter than {1e3 * told.shorter:.3g} mm"
@@ -117,10 +117,11 @@ def _complete(found: Equilibria) -> list[str]:
         ]
     where += f", except for poses at which {', or '.join(apart)}" if apart else ""
     lines = [
-        f"all equilibria, proved by {told.result.boxes:,} boxes of poses: no other in any working mode of the legs, {where}"
+        f"all equilibria, proved by {told.result.boxes:,} boxes of poses: no other in any working mode of the legs, "
+        + where
     ]
     if told.crossings:
-        lines += [f"except for continuous families of equilibria, at {told.crossings} points where the joints of two legs lock"]
+        lines += [f"except for continuous families, at {told.crossings} points where the joints of two legs lock"]
     if told.locked:
         most = max(within for _, within in told.locked)
         lines += [
@@ -140,7 +141,7 @@ def _alone(cover: CompletenessReport) -> list[str]:
     return [
         *(
             [
-                f"{len(some)} proved critical poses are not listed above: the robot could not be assembled there, or the "
+                f"{len(some)} proved critical poses are not listed above: the robot was not assembled there, or the "
                 "computed command does not vanish (where joints lock):"
             ]
             if some
@@ -168,7 +169,12 @@ def _lines(rests: list[Equilibrium]) -> tuple[list[list[str]], list[int]]:
     or other links."""
     rows = Counter(tuple(_line(each)) for each in rests)
     return [
-        [*row, notes if count == 1 else f"{notes}{'; ' * bool(notes)}{count} equilibria with different poses of other links"]
+        [
+            *row,
+            notes
+            if count == 1
+            else f"{notes}{'; ' * bool(notes)}{count} equilibria with different poses of other links",
+        ]
         for (*row, notes), count in rows.items()
     ], list(rows.values())
 
@@ -192,7 +198,9 @@ def _line(each: Equilibrium) -> list[str]:
     if each.kind == "critical" and each.stable and each.error <= measurement_bound(MEASUREMENT_BOUND):
         notes.append(f"near mode: directions differ by at most {degrees(each.error)}")
     if each.convergence_rates and each.kind == "critical":
-        notes.append(f"convergence rates {', '.join(f'{(low + high) / 2:.3g}' for low, high in each.convergence_rates)}")
+        notes.append(
+            f"convergence rates {', '.join(f'{(low + high) / 2:.3g}' for low, high in each.convergence_rates)}"
+        )
     return [
         each.kind,
         f"{each.error:.3g}" if each.kind == "critical" else "0",

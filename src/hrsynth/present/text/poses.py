@@ -175,7 +175,9 @@ def _posture(posture: ConfigurationReport, length: float, setup: ObservedRobot) 
             ),
         ]
         if far.condition > 1 / NOISE:
-            rows.append(("", f"nearly singular: not distinguishable from a singularity with dimensions known to {NOISE:g}"))
+            rows.append(
+                ("", f"nearly singular: not distinguishable from a singularity with dimensions known to {NOISE:g}")
+            )
     elif far.type2 is None:
         rows.append(("", NO_MATRIX))
     if posture.real is None:
@@ -184,9 +186,7 @@ def _posture(posture: ConfigurationReport, length: float, setup: ObservedRobot) 
         rows += _kinds("real robot", f"the motors determine {posture.real.rank} of {dof}", posture.real, "undetermined")
     if posture.constraint_singular:
         rows.append(("loops", ["lose rank here; the platform gains", *(freedom.name for freedom in posture.gained)]))
-    rows += [
-        ("redundant here", f"loop {each.loop}: {each.rows} more of its constraints") for each in posture.redundant
-    ]
+    rows += [("redundant here", f"loop {each.loop}: {each.rows} more of its constraints") for each in posture.redundant]
     return [*rows, ("loop Jacobian", f"smallest singular value {far.constraints:.3g}, relative to the largest")]
 
 
@@ -496,7 +496,7 @@ def road(found: SampledRoute, value: str) -> list[str]:
     """Describe the samples on the straight path."""
     signs = {None: "", 0: ", the same sign at all"}.get(found.changes, f", {found.changes} sign changes")
     lines = [
-        f"|{value}| at least {found.least:.3g} at {found.count} poses of the straight path, smallest at {found.at}{signs}"
+        f"|{value}| at least {found.least:.3g} at {found.count} poses of the straight path, least at {found.at}{signs}"
     ]
     if found.reached < 1:
         lines.append(f"the robot was tracked over the first {100 * found.reached:.0f} % of that path only")

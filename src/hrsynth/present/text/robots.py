@@ -71,10 +71,7 @@ def robot(found: Mechanism) -> str:
         decomposition = decompose(normal_form(found).mechanism)
         rows.insert(0, ("robot", f"{found.name}   {decomposition.architecture()}"))
         watched = {label: f"observed at {o.link}" for label, o in defaults_of(decomposition).items()}
-        rows += [
-            (f"leg {leg.label}", watched.get(leg.label, "no observable segment"))
-            for leg in decomposition.legs
-        ]
+        rows += [(f"leg {leg.label}", watched.get(leg.label, "no observable segment")) for leg in decomposition.legs]
     except HrsynthError as error:
         rows[:0] = [("robot", [found.name, str(error)])]
     return listing([*rows, ("note", [str(note) for note in found.notes])])
@@ -125,7 +122,9 @@ def derivation(found: Derivation) -> str:
                 ],
             )
         )
-    return "\n".join([listing(rows), "", table(list(_attempts(found.steps)), ("rule", "leg", "accepted", "angle", "reason"))])
+    return "\n".join(
+        [listing(rows), "", table(list(_attempts(found.steps)), ("rule", "leg", "accepted", "angle", "reason"))]
+    )
 
 
 def _ends(decomposition: LegDecomposition) -> Rows:

@@ -94,16 +94,15 @@ def servo(found: Servo) -> str:
         rows.append(
             (
                 "noise",
-                f"within {1e3 * s.metres:.3g} mm and {_degrees(s.radians)} deg of this pose in this run, root mean square "
-                f"{1e3 * s.rms_metres:.2g} mm and {_degrees(s.rms_radians)} deg",
+                f"within {1e3 * s.metres:.3g} mm and {_degrees(s.radians)} deg of this pose in this run, "
+                f"root mean square {1e3 * s.rms_metres:.2g} mm and {_degrees(s.rms_radians)} deg",
             )
         )
         if s.aside:
             rows.append(
                 (
                     "",
-                    f"mean offset {1e3 * s.offset:.3g} mm, at "
-                    f"({' '.join(f'{value:.4g}' for value in s.mean)})",
+                    f"mean offset {1e3 * s.offset:.3g} mm, at ({' '.join(f'{value:.4g}' for value in s.mean)})",
                 )
             )
     rows.append(("notes" if found.spread is None and found.notes else "", list(found.notes)))
@@ -320,7 +319,9 @@ def _range(found: ErrorRange, errors: Array | None, unit: float, word: str) -> s
         if errors is not None:
             text[0] += f", median {unit * np.median(errors[errors <= found.largest]):.4g}"
     text += [f"{NOT_BOUNDED} at {found.slack} poses"] * (found.slack > 0)
-    return "; ".join([*text, *[f"infinite at {found.infinite} poses, where a dof is unobserved"] * (found.infinite > 0)])
+    return "; ".join(
+        [*text, *[f"infinite at {found.infinite} poses, where a dof is unobserved"] * (found.infinite > 0)]
+    )
 
 
 def _samples(errors: PoseErrors, true: NonlinearCheck) -> Rows:
@@ -344,9 +345,7 @@ def _samples(errors: PoseErrors, true: NonlinearCheck) -> Rows:
             "error: a controller leaves it there, by more than computed"
         )
     if true.not_found:
-        lines.append(
-            f"{true.not_found} of them were not tracked to the end: the solver stopped, which is no property of the robot"
-        )
+        lines.append(f"{true.not_found} of them were not tracked to the end, as the solver stopped")
     whole = not true.not_found
     if _apart(true.position, errors.position, whole) or _apart(true.orientation, errors.orientation, whole):
         lines.append("they contradict the maxima above, which are unreliable here")

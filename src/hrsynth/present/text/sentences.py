@@ -32,9 +32,7 @@ def which(verdict: Verdict) -> str:
     if not verdict.dof:
         return "The platform cannot move: there is nothing to control."
     if not verdict.rank:
-        return (
-            "Observing the legs is useless: their directions do not change with the platform at any sample."
-        )
+        return "Observing the legs is useless: their directions do not change with the platform at any sample."
     lost = len(verdict.unobserved)
     return (
         f"Observing legs is not enough: even with all of them {lost} of {verdict.dof} dof "
@@ -126,7 +124,8 @@ def alike(found: AssemblyModes) -> str | None:
     if found.near_modes:
         return f"At the zero configuration, {found.alike}{far}"
     count = len(found.modes)
-    words = f"At the zero configuration, {count} pose{'s have' if count > 1 else ' has'} the same {describe_held(found.setup)}"
+    what = f"pose{'s have' if count > 1 else ' has'} the same {describe_held(found.setup)}"
+    words = f"At the zero configuration, {count} {what}"
     return f"{words} ({all_of(found)}){far if count > 1 else '.'}"
 
 

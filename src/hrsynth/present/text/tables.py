@@ -84,8 +84,8 @@ def name_all(noun: str, words: Sequence[str]) -> str:
 
 
 def is_bounded(error: Any, length: float = 1.0) -> Any:
-    """Return True where a displacement (m, with a characteristic ``length``) or a rotation (rad) is small enough for the
-    first order."""
+    """Return True for a displacement (m, with a characteristic ``length``) or a rotation (rad) that is small enough for
+    the first order."""
     return error <= LARGEST_FIRST_ORDER * length
 
 

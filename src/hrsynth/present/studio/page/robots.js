@@ -94,7 +94,7 @@ function outline(record, places, colour, { opacity = 0.3, name = null, size = 0,
   return group;
 }
 
-/* The arrow of a leg's direction, with the leg's name: strong where it is watched. It follows its link. */
+/* The arrow of a leg's direction, with the leg's name: strong if it is observed. It follows its link. */
 class Direction {
   constructor(record, { length, radius }) {
     this.record = record;
