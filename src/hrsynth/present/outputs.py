@@ -307,10 +307,10 @@ OUTPUTS = {
         "text.equilibria:endings",
         (
             File(
-                "cannot draw the endings",
+                "cannot draw the equilibria",
                 figures("equilibria:picture"),
-                "The picture of the endings",
-                "Draw the endings: equilibria.png, .pdf, .svg.",
+                "The figure of the equilibria",
+                "Draw the equilibria: equilibria.png, .pdf, .svg.",
                 drawn=True,
             ),
         ),
@@ -336,7 +336,7 @@ OUTPUTS = {
             File(
                 "cannot draw the modes",
                 figures("modes:picture"),
-                "The picture of the modes",
+                "The figure of the modes",
                 "Draw the modes: modes.png, .pdf, .svg.",
                 nothing="modes:why_undrawn",
                 drawn=True,
@@ -353,7 +353,7 @@ OUTPUTS = {
             File(
                 "cannot draw the run",
                 {**figures("runs:picture"), ".gif": "animations:animation"},
-                "The picture of the run",
+                "The figure of the run",
                 "Draw the run: curves (run.png, .pdf, .svg) or an animation (run.gif).",
                 allowed=".png, .pdf, .svg (curves) or .gif (camera view)",
                 drawn=True,
@@ -398,12 +398,12 @@ OUTPUTS = {
         inline="studio.saved:inline",
     ),
 }
-"""The outputs by the name under which a result is shown (:attr:`hrsynth.results.Result.shown_as`): that of its
-command, or of its kind where it is a part of an answer."""
+"""Outputs by the name under which a result is shown (:attr:`hrsynth.results.Result.shown_as`): its command, or its
+kind if it is a part of a result."""
 
 
 def outputs_of(name: str) -> Outputs:
-    """The outputs of a kind of answer: those of the table, else what its class draws and writes itself."""
+    """Return the outputs of a kind of result: those of the table, else those that its class defines."""
     if name in OUTPUTS:
         return OUTPUTS[name]
     kind = Result.answer_of(name)
@@ -413,7 +413,7 @@ def outputs_of(name: str) -> Outputs:
     if kind.rows is not Result.rows:
         makers[CSV] = _csv
     help = f"Write {name}{', '.join(makers)}."
-    file = File(f"cannot write the answer of {name}", makers, f"The answer of {name}", help, drawn=PNG in makers)
+    file = File(f"cannot write the result of {name}", makers, f"The result of {name}", help, drawn=PNG in makers)
     return Outputs(kind.text, (file,) if makers else ())
 
 

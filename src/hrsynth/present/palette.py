@@ -48,7 +48,7 @@ PAGE = {
 SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Colours of curves without a meaning, in the order of the style of all plots."""
 TINT = 0.4
-"""Fraction of its colour inside a symbol; the rest is white."""
+"""Fraction of its colour inside a symbol; its complement is white."""
 
 
 def colour(meaning: str) -> str:

@@ -27,7 +27,7 @@ WORDS = {
     "C": "cylindrical joint",
     "E": "planar joint",
     "F": "fixed joint",
-    "6": "no joint (six freedoms)",
+    "6": "no joint (six dof)",
     "Π": "planar parallelogram",
 }
 

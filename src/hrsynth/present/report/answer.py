@@ -32,8 +32,8 @@ def good(found: Verdict) -> bool:
 
 
 def set_rows(found: Legs, most: int) -> Iterator[tuple[tuple[str, ...], Verdict, str, bool]]:
-    """Yield the rows of the table, ``most`` at most: sets (equal ones of full rank share a row), verdict, exact verdict,
-    whether they are smallest."""
+    """Yield the rows of the table, ``most`` at most: sets (equal ones of full rank share a row), verdict, exact
+    verdict, whether they are smallest."""
     alike: dict[object, tuple[list[str], Verdict, str, bool]] = {}
     for each, exact in zip(found.sets[:most], found.exact, strict=False):
         cell, smallest = exact_cell(exact, each.rank), each.legs in found.minimal

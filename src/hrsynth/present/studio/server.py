@@ -149,7 +149,7 @@ def view_server(found: View, port: int = 0, open_: bool = True, source: dict[str
 
 
 def _as_read(robot: Mechanism) -> dict[str, Any] | None:
-    """A robot by its file, or the name of a shipped one, where it is just what that says."""
+    """Return a robot by its file, or by the name of a shipped one, if it equals that."""
     from ...description import list_robots, load
 
     if robot.file is None:

@@ -102,7 +102,7 @@ def _complete(found: Equilibria) -> list[str]:
         else f"with each coordinate of the point within {told.within:.3g} m of that at the goal"
     )
     if told.result.struts is not None:
-        where += f", while the platform translates, in "
+        where += ", while the platform translates, in "
         where += f"{'the only orientation' if turns == 1 else f'all {turns} orientations'} in which it can"
     else:
         where += _turned(found)

@@ -310,7 +310,10 @@ def modes(found: AssemblyModes) -> str:
         place = "the given pose" if motion.goal else str(found.pose_of(motion))
         starts = f"{motion.hits} start{'s' * (motion.hits > 1)}"
         met = f"; {starts} ended on it or an equal one" if motion.hits else ""
-        rows += [*GAP, (f"motion {number}", [f"through {place}, found, not proved: a self-motion {motion.words}{met}"])]
+        rows += [
+            *GAP,
+            (f"motion {number}", [f"through {place}", f"found, not proved: a self-motion {motion.words}{met}"]),
+        ]
     for number, mode in enumerate(found.modes, 1):
         rows += [
             *GAP,

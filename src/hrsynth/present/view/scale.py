@@ -37,7 +37,7 @@ def step_of(value: float | None, unit: str) -> int:
 
 
 def error(setup: ObservedRobot, at: ClosedConfiguration) -> dict[str, Any]:
-    """Compute the largest error of the platform at a configuration (:func:`.largest_by_ascent`); None without a bound to
+    """Compute the largest error of the platform at a configuration (:func:`.largest_by_ascent`), None if not bounded to
     first order."""
     unit = unit_of(setup)
     if not all(isinstance(each, Direction) for each in setup.observed):

@@ -35,7 +35,7 @@ class Shape(Value):
     """A shape on a link, its ``points`` (n, 3) and half-width ``size`` (m).
 
     ``kind``: rod, rail and span run from the first point to the second, a span from a point of ``link`` to one of
-    ``other``; a plate is the polygon of its points; a ball has one point; a hinge is a cylinder along its axis, a
+    ``other``; a plate is the polygon of its points; a ball has one point; ``hinge`` is a cylinder along its axis, a
     slider a box, a cross has two axes (four points), a disc lies across its axis; a mesh has ``faces`` (m, 3).
     """
 
