@@ -20,7 +20,7 @@ from hrsynth.present.palette import PAGE, SERIES, colour, tint
 
 Array = NDArray[np.float64]
 FOLDER = Path(__file__).resolve().parent / "pictures"
-OBSERVED, LEG, MODE, GOAL, TYPE2 = (colour(meaning) for meaning in ("watched", "leg", "mode", "goal", "actuator"))
+OBSERVED, LEG, MODE, GOAL, TYPE2 = (colour(meaning) for meaning in ("observed", "leg", "mode", "goal", "actuator"))
 ROBOT = hrsynth.load("rrrrr_m1")
 A, B, C = (
     np.array([ROBOT.joints[name].point[:2] for name in names])

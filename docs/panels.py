@@ -133,7 +133,7 @@ def sheet(name: str, file: Path) -> None:
 def shown(page: Any) -> Iterator[str]:
     """Show one panel after the other."""
     page.locator("body[data-ready=yes]").wait_for(timeout=SLOW)
-    page.locator("#answer", has_text=re.compile(r"^(?!.*Working out)")).wait_for(timeout=SLOW)
+    page.locator("#answer", has_text=re.compile(r"^(?!.*Computing which legs)")).wait_for(timeout=SLOW)
     settled(page)
     yield panel(page, "robot")
     panel(page, "move")

@@ -73,7 +73,7 @@ def test_the_page_of_a_robot_shows_it_and_its_sliders_move_it(name: str, tab: Ta
         others = [k for k in range(sliders.count()) if k != number]
         assert all(sliders.nth(k).input_value() == str(seen(name).sliders[k].home) for k in others)
         before = there
-    tab.page.get_by_role("button", name="Home").click()
+    tab.page.get_by_role("button", name="Zero configuration").click()
     assert changed(home, drawn(tab)) == 0
 
 
@@ -85,6 +85,8 @@ def test_either_robot_is_shown_alone_or_both_with_the_other_modes(tab: Tab, tmp_
     tab.open(file, READY)
     before = drawn(tab)
     assert tab.page.locator(".modes li").count() == len(seen("quattro").mode_outlines)
+    assert tab.page.evaluate("() => studio.stage.parts.ghosts.children.length") == 0
+    tab.page.get_by_role("checkbox", name="Draw their outlines").check()
     assert tab.page.evaluate("() => studio.stage.parts.ghosts.children.length") == len(seen("quattro").mode_outlines)
     for layout in ("real", "hidden", "beside", "overlay"):
         tab.page.evaluate("(value) => document.querySelector(`input[value=${value}]`).click()", layout)
@@ -134,7 +136,7 @@ def test_with_a_server_sliders_move_the_robot_together(address: str, tab: Tab):
     one, other = (b - a for a, b in zip(home, known("() => studio.values"), strict=True))
     assert one > 0 > other
     assert tab.page.get_by_role("tab").count() == 0
-    tab.page.get_by_role("button", name="Home").click()
+    tab.page.get_by_role("button", name="Zero configuration").click()
     assert soon(lambda: known("() => !studio.moving && studio.values") == pytest.approx(home))
 
 

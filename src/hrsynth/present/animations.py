@@ -1,5 +1,5 @@
-"""A servo run → an animation (GIF, 1280 × 720): what a camera sees that watches the legs, over what it is to see, and
-what is happening, in words and as a curve."""
+"""Animation of a servo run (GIF, 1280 × 720): the camera image of the observed legs over that at the goal, captions and
+curves."""
 
 from __future__ import annotations
 
@@ -26,29 +26,29 @@ from .runs import ENDS, LEAST_TURN, until
 from .text.tables import name_all
 
 FRAMES, PAUSE = 50, 12
-"""Pictures of the run, and how often the last one is shown on."""
+"""Frames of the run, and repetitions of the last one."""
 MILLISECONDS = 80
-"""How long each picture is shown."""
+"""Duration of a frame."""
 WIDTH, HEIGHT, SIDE, DOTS = 1280, 720, 440, 100
-"""Pixels of the animation, of the words beside the camera's picture, and an inch."""
+"""Pixels of the animation, of the captions beside the camera image, and an inch."""
 FOCAL = 1.25
-"""Focal length of the camera over its picture's width."""
+"""Focal length of the camera over the width of its image."""
 ELEVATION = 0.3
-"""How far down the camera looks (rad)."""
+"""Downward angle of the camera (rad)."""
 WANTED = 0.45
-"""How bright what the camera is to see is beneath what it sees."""
+"""Brightness of the image at the goal below the present one."""
 AFTER = 3
-"""Pictures during which a crossing is told."""
+"""Frames during which a crossing is captioned."""
 SHADES = 32
 """Colours of the file."""
-WATCHED = np.array([int(palette.colour("watched")[i : i + 2], 16) / 255 for i in (1, 3, 5)])
+WATCHED = np.array([int(palette.colour("observed")[i : i + 2], 16) / 255 for i in (1, 3, 5)])
 LINE = 38
 """Letters of a line of words."""
 
 
 @in_style
 def animation(found: Servo) -> bytes:
-    """The run as GIF, at equal parts of its way; raises ``MissingExtra``, ``NotRendered``."""
+    """Draw the run as GIF, at equal parts of its path; raise ``MissingExtra``, ``NotRendered``."""
     from PIL import Image
 
     setup, configurations = found.setup, found.run.configurations
@@ -66,7 +66,7 @@ def animation(found: Servo) -> bytes:
         report("frames")
         seen = _lit(stage.picture(configurations[number].pose))
         frame = sheet.at(number, words)
-        frame[:, : seen.shape[1]] = 255 * np.where(_bare(seen)[..., None], paper, seen)
+        frame[:, : seen.shape[1]] = frame[:, : seen.shape[1]] * np.where(_bare(seen)[..., None], paper, seen)
         frames.append(Image.fromarray(frame).quantize(SHADES, dither=Image.Dither.NONE))
     stream = io.BytesIO()
     frames[0].save(
@@ -82,18 +82,18 @@ def animation(found: Servo) -> bytes:
 
 
 def require_legs(setup: ObservedRobot, **_: Any) -> None:
-    """Raise ``BadRequest`` where something else is observed than legs."""
+    """Raise ``BadRequest`` if others than legs are observed."""
     for each in setup.observed:
         if not each.by_segment:
             raise BadRequest(
-                f"{setup.robot.name}: an animation draws the legs that are watched",
+                f"{setup.robot.name}: an animation shows observed legs only",
                 f"{each.kind} {each.leg}",
-                "a picture (.png, .pdf, .svg), which draws all kinds",
+                remedy="Write a figure (.png, .pdf, .svg), which shows all kinds.",
             )
 
 
 def captions(found: Servo, moments: list[int]) -> Iterator[str]:
-    """What happens at each of the moments (numbers of configurations, the last one the end)."""
+    """Yield a caption for each of the moments (numbers of configurations, the last one the end)."""
     sizes = found.errors.max(axis=1)
     metres, radians = found.from_goal
     passages = found.track.passages or ()
@@ -101,38 +101,43 @@ def captions(found: Servo, moments: list[int]) -> Iterator[str]:
         since = moments[max(0, k - AFTER)]
         passed = [each for each in passages if since < each.place <= number]
         if k == 0:
-            yield "The start. Pale: where the watched legs should be. Bright: where they are."
+            yield "Start. Pale: observed legs at the goal. Bright: observed legs now."
         elif k == len(moments) - 1:
             turned = f" and {np.degrees(radians):.2g}°" if np.degrees(radians) > LEAST_TURN else ""
-            yield f"The end: {ENDS[found.outcome]}. The platform is {1e3 * metres:.3g} mm{turned} from the goal."
+            yield f"End: {ENDS[found.outcome]}. The platform is {1e3 * metres:.3g} mm{turned} from the goal."
         elif passed:
             yield (
-                "A singularity is crossed: for a moment the legs do not show how the platform moves."
+                "Type 2 singularity crossed: at this pose a dof of the platform is unobserved."
                 if passed[-1].kind == TYPE_2
-                else "A leg passes its limit."
+                else "A leg passes a Type 1 singularity."
             )
         elif sizes[number] > REST_OF_RUN * sizes.max():
-            yield "The controller turns the watched legs towards their desired directions."
+            yield "The controller rotates the observed legs towards the goal directions."
         else:
-            yield "The watched legs have their desired directions; the platform comes to rest."
+            yield "The observed legs have the goal directions; the platform stops."
 
 
 class Sheet:
-    """The right part of each picture: title, words, time, and curves with a mark where the run is."""
+    """Right part of each frame: title, caption, time, and curves with a mark at the present time."""
 
     def __init__(self, found: Servo) -> None:
         self.times = found.run.times
         figure = self.figure = empty_figure(WIDTH / DOTS, HEIGHT / DOTS, dpi=DOTS)
         left, wide = (WIDTH - SIDE + 30) / WIDTH, (SIDE - 60) / WIDTH
         figure.text(left, 0.945, found.setup.robot.name, fontsize=17, fontweight="bold", va="center")
-        figure.text(left, 0.895, f"from {pose_words(found.start)}\nto {pose_words(found.goal)}", fontsize=9, va="top")
+        figure.text(
+            left, 0.895, f"start {pose_words(found.start)}\ngoal {pose_words(found.goal)}", fontsize=9, va="top"
+        )
+        figure.text(0.015, 0.965, "camera image", fontsize=12, va="center")
         self.words = figure.text(left, 0.79, "", fontsize=14, va="top", linespacing=1.35)
-        figure.text(left, 0.53, "■", fontsize=11, va="center", color=palette.colour("watched"))
-        figure.text(left + 0.016, 0.53, name_all("leg", found.setup.labels), fontsize=10, va="center")
+        figure.text(left, 0.53, "■", fontsize=11, va="center", color=palette.colour("observed"))
+        figure.text(
+            left + 0.016, 0.53, f"observed {name_all('leg', found.setup.labels)}; pale: goal", fontsize=10, va="center"
+        )
         self.marks: list[Any] = []
         for bottom, values, label in (
-            (0.29, found.errors.max(axis=1), "largest error of a direction"),
-            (0.075, found.track.smallest, "distance to the singularity"),
+            (0.29, found.errors.max(axis=1), "largest direction error"),
+            (0.075, found.track.smallest, "singularity distance"),
         ):
             place = figure.add_axes((left + 0.025, bottom, wide - 0.025, 0.135))
             place.plot(self.times, values, color="0.35")
@@ -142,7 +147,7 @@ class Sheet:
         place.set_xlabel("time (s)")
 
     def at(self, number: int, words: str) -> Array:
-        """The picture (height, width, 3), bytes, without what the camera sees."""
+        """Draw a frame (height, width, 3), bytes, without the camera image."""
         self.words.set_text(textwrap.fill(words, LINE))
         for mark, values in self.marks:
             mark.set_data([self.times[number]], [values[number]])
@@ -151,7 +156,7 @@ class Sheet:
 
 
 def _camera(found: Servo) -> Camera:
-    """A camera that has the whole robot in its picture at both ends of the run, from above its side."""
+    """Place a camera with the whole robot in its image at both ends of the run, from above."""
     mechanism, reference = found.setup.mechanism, found.setup.samples.observation_model.reference
     links = []
     for link in set(mechanism.links) - {mechanism.base}:
@@ -166,8 +171,7 @@ def _camera(found: Servo) -> Camera:
 
 
 def _moments(places: Array, errors: Array) -> list[int]:
-    """Numbers of configurations that cut the way into equal parts, what moves the platform and what turns the legs
-    counted alike."""
+    """Return numbers of configurations that divide the run equally by motion of platform and legs."""
     ways = [
         np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(values, axis=0), axis=1))])
         for values in (places, errors)
@@ -177,7 +181,7 @@ def _moments(places: Array, errors: Array) -> list[int]:
 
 
 def _lit(picture: Array) -> Array:
-    """A picture on black, 0 to 255, as colours between 0 and 1: watched legs in theirs, dark grey made lighter."""
+    """Convert a rendered image, 0 to 255, to colours from 0 to 1: observed legs in theirs, dark grey lighter."""
     bright = picture / 255.0
     high, low = _brightest(bright), -_brightest(-bright)
     grey = (high - low < 0.05) & (high > 0.5 * GREY)
@@ -185,10 +189,10 @@ def _lit(picture: Array) -> Array:
 
 
 def _bare(colours: Array) -> Array:
-    """Where nothing is."""
+    """Return the mask of empty pixels."""
     return np.asarray(_brightest(colours) < 0.5 * GREY)
 
 
 def _brightest(colours: Array) -> Array:
-    """The largest of the three channels, faster than a reduction over a short axis."""
+    """Return the largest of the three channels, faster than a reduction over a short axis."""
     return np.maximum(np.maximum(colours[..., 0], colours[..., 1]), colours[..., 2])

@@ -1,5 +1,5 @@
-"""The atlas of aspects → a picture: the table of modes, and of three rods on cranks the curve of Type 2 singularities,
-among the directions of two rods and on the surface of poses with the third one's direction."""
+"""Figure of aspects: the table of modes, and of three rods on cranks the curve of Type 2 singularities, in the plane of
+two directions and on the surface of poses with the third direction fixed."""
 
 from __future__ import annotations
 
@@ -23,44 +23,44 @@ from .plots import cell_edges, entry, in_style, panels
 CELLS = {SAME: (tint(PAGE["good"]), "="), SEPARATED: (tint(PAGE["wrong"]), "|"), UNDECIDED: (PAGE["line"], "?")}
 CURVE, CUSP, NODE = "black", SERIES[1], SERIES[2]
 STAR = {"color": MEANINGS["goal"][1], "markeredgecolor": "black"}
-"""The goal."""
+"""Marker of the goal."""
 SHADES = ("white", *(tint(SERIES[0], share) for share in (0.1, 0.22, 0.4)))
-"""No mode, two, four, six."""
+"""Colours of no mode, two, four, six."""
 LEAST_PANEL = 3.0
 """The least width (inches) of one of several drawings."""
 COUNTED, PLACES = 161, 480
-"""Directions a side for which modes are counted, and places of the first corner that are looked at for it."""
+"""Directions per side for which modes are counted, and samples of the first corner for that."""
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnSection:
-    """What is drawn of a section: the curve and the modes' places, or why there is none."""
+    """Drawn section: the curve and the modes, or the reason for its absence."""
 
     found: tuple[SingularitySlice, dict[int, CrankPlace]] | None
     reason: str | None
 
     def to_dict(self) -> dict[str, Any]:
-        """The section, or why there is none."""
+        """Return the section, or the reason for its absence."""
         return {"reason": self.reason} if self.found is None else self.found[0].to_dict()
 
 
 def section(found: AspectTable, seed: int) -> DrawnSection:
-    """The section with the first watched leg held."""
+    """Return the section with the first observed leg fixed."""
     made = found.section
     return DrawnSection(None, made) if isinstance(made, str) else DrawnSection(made, None)
 
 
 def undrawn(found: AspectTable) -> str | None:
-    """Why there is no table."""
+    """Return why there is no table."""
     return why_undrawn(found.listed)
 
 
 @in_style
 def picture(found: AspectTable, drawn: DrawnSection, paper: Paper = PNG) -> bytes:
-    """The picture (PNG); raises ``BadRequest`` where there are no modes."""
+    """Draw the figure; raise ``BadRequest`` if there are no modes."""
     why = why_undrawn(found.listed)
     if why is not None:
-        raise BadRequest(f"{found.listed.setup.robot.name}: there is nothing to draw: {why}", None, "isolated modes")
+        raise BadRequest(f"{found.listed.setup.robot.name}: there is nothing to draw: {why}")
     count = 1 if drawn.found is None else 3
     columns = paper.columns(count, LEAST_PANEL)
     rows = -(-count // columns)
@@ -81,7 +81,7 @@ def picture(found: AspectTable, drawn: DrawnSection, paper: Paper = PNG) -> byte
     seen = ", ".join(found.listed.setup.labels)
     told = ", cuspidal" if found.cuspidal else ""
     figure.suptitle(
-        f"{found.listed.setup.robot.name}, legs {seen} watched\n{found.listed.count}, "
+        f"{found.listed.setup.robot.name}, legs {seen} observed\n{found.listed.count}, "
         f"aspects: {found.aspects_met}{told}"
     )
     return print_figure(figure, paper)
@@ -106,7 +106,7 @@ def _table(place: Any, found: AspectTable) -> None:
         for k, label in enumerate(axis.get_ticklabels()):
             label.set(color=_colour(found, k + 1), fontweight="bold")
         place.tick_params(axis=name, length=0)
-    place.set(xlim=(0, size), ylim=(size, 0), aspect="equal", title="mode × mode")
+    place.set(xlim=(0, size), ylim=(size, 0), aspect="equal", title="pairs of modes")
     place.set_frame_on(False)
 
 
@@ -154,14 +154,14 @@ def _curves(axes: Any, found: AspectTable, drawn: SingularitySlice, modes: dict[
         )
         here.text(x, y, str(number), ha="center", va="center", color="white", fontsize=9, fontweight="bold", zorder=6)
     there.set(
-        xlabel=f"direction of leg {labels[1]} (degrees from the goal's)",
-        ylabel=f"direction of leg {labels[2]} (degrees from the goal's)",
-        title=f"directions, leg {labels[0]} held",
+        xlabel=f"direction of leg {labels[1]} (deg from the goal)",
+        ylabel=f"direction of leg {labels[2]} (deg from the goal)",
+        title=f"directions, leg {labels[0]} fixed",
     )
     here.set(
-        xlabel=f"crank {labels[0]} (degrees from the goal's)",
-        ylabel="φ (degrees from the goal's)",
-        title=f"poses, leg {labels[0]} held",
+        xlabel=f"crank {labels[0]} (deg from the goal)",
+        ylabel="φ (deg from the goal)",
+        title=f"poses, leg {labels[0]} fixed",
     )
     for place, used in ((there, counts > 0), (here, np.ones((COUNTED, COUNTED), dtype=bool))):
         shown = [np.degrees(ticks[np.flatnonzero(used.any(axis=axis))[[0, -1]]]) for axis in (1, 0)]
@@ -170,11 +170,11 @@ def _curves(axes: Any, found: AspectTable, drawn: SingularitySlice, modes: dict[
         place.yaxis.set_major_locator(MultipleLocator(30 if np.ptp(shown[1]) < 240 else 60))
     kinds = [
         entry("Type 2 singularities", color=CURVE, linewidth=1.2),
-        entry("the goal's directions", linestyle="", marker="*", markersize=11, **STAR),
+        entry("directions of the goal", linestyle="", marker="*", markersize=11, **STAR),
     ]
     nodes = [place for place, _ in drawn.nodes]
     for points, colour, mark, name in ((drawn.cusps, CUSP, "o", "cusp"), (nodes, NODE, "s", "node")):
-        for proved, words in ((True, f"{name}, enclosed"), (False, f"{name}, found")):
+        for proved, words in ((True, f"{name}, enclosed"), (False, f"{name}, numerical")):
             if any((point.radius is not None) == proved for point in points):
                 kinds.append(
                     entry(words, linestyle="", marker=mark, color=colour, markerfacecolor=colour if proved else "white")

@@ -1,4 +1,4 @@
-"""Where each start ends → a map of basins with the ends drawn in, or a table."""
+"""Map of the basins of attraction with the final poses, or a table."""
 
 from __future__ import annotations
 
@@ -45,19 +45,19 @@ SHADES = {
     TIME: ("0.3",),
     UNDECIDED: ("0.5",),
 }
-"""Colours of the ends of each kind, the largest first."""
+"""Colours of the outcomes of each kind, the most frequent first."""
 MARKS = {GOAL: "*", MODE: "o", ANTIPODAL: "X", MINIMUM: "v", BOUNDARY: "s", SIGHT: "^", UNDECIDED: "P", TIME: "d"}
 ROOM = 3.0
 """Cells from the border of a basin at which its letter has room."""
 SEEN, RING = 0.05, 26
-"""Part of a map's width below which what is certified is not seen; the diameter (points) of the ring about it."""
+"""Fraction of a map's width below which the proved region is not visible; diameter (points) of the ring about it."""
 BESIDE = 13.0
 """Points from the mark of an end to its letter."""
 DARKEST, LIGHTEST = 0.4, 0.5
 """Where a kind has more ends than shades: the darkest, as part of the first shade; the lightest, as part of what the
 last one lacks of white."""
 DAMPED: dict[str, Any] = {"facecolor": "none", "edgecolor": "0.25", "hatch": "....", "linewidth": 0.0}
-"""How starts are drawn whose runs come to a singularity."""
+"""Style of starts whose runs reach a singularity."""
 
 
 def colours(ends: tuple[BasinEnd, ...]) -> list[str]:
@@ -107,14 +107,14 @@ def picture(found: Basins, paper: Paper = PNG) -> bytes:
         told += " ends there" + "\n(drawn larger)" * larger
         entries.append(
             entry(
-                f"certified: every start\n{told}",
+                f"proved: every start\n{told}",
                 color="white",
                 linewidth=1.6,
                 path_effects=[Stroke(linewidth=3.4, foreground="black"), Normal()],
             )
         )
     if found.damped.any():
-        entries.append(Patch(label="the run comes to a singularity", **DAMPED))
+        entries.append(Patch(label="run reaches a singularity", **DAMPED))
     if (found.cells == NOT_REACHED).any():
         entries.append(missing_entry())
     kinds = dict.fromkeys(each.run_outcome.name for each in found.ends)
@@ -126,7 +126,7 @@ def picture(found: Basins, paper: Paper = PNG) -> bytes:
     if any(not inside for _, inside in drawn):
         others = " or ".join("φ" if name == "phi" else name for name in _shared_parts(found, 0.0))
         entries.append(
-            entry(f"hollow: at another {others}", linestyle="", marker="o", markerfacecolor="none", color="black")
+            entry(f"hollow: other {others}", linestyle="", marker="o", markerfacecolor="none", color="black")
         )
     if grid.ndim > 1:
         entries += MapPlane.of(grid.axes, found.setup.motion, 0.4, 1.6).robot(figure, found.setup.all_samples.start)
@@ -134,8 +134,8 @@ def picture(found: Basins, paper: Paper = PNG) -> bytes:
     word = "legs " if all(each.by_segment for each in found.setup.observed) else ""
     heading(
         figure,
-        f"{found.setup.robot.name}, {word}{', '.join(found.setup.labels)} observed: where each start "
-        f"ends\ngoal {plots.pose_words(found.goal)}",
+        f"{found.setup.robot.name}, {word}{', '.join(found.setup.labels)} observed: outcome of each "
+        f"start\ngoal {plots.pose_words(found.goal)}",
         grid.fixed,
         "; starts: ",
     )
@@ -255,7 +255,7 @@ def _draw_certified(place: Any, plane: MapPlane, found: Basins, level: float | N
 
 
 def _inside(found: Basins, end: BasinEnd, level: float | None) -> bool:
-    """Whether an end is one of the poses of a plane or line; ``level`` is the third part's value of one of a box."""
+    """Return True if a final pose lies in a plane or line; ``level`` is the third coordinate of a plane of a box."""
     assert end.X is not None
     held = _shared_parts(found, level)
     away = np.abs(place_of(found.setup.motion, end.X, tuple(held)) - np.array(list(held.values())))
@@ -269,7 +269,7 @@ def _shared_parts(found: Basins, level: float | None) -> dict[str, float]:
 
 
 def outline_strokes() -> list[Any]:
-    """Strokes of letters that are read on any colour."""
+    """Return strokes of letters that are legible on any colour."""
     from matplotlib.patheffects import Normal, Stroke
 
     return [Stroke(linewidth=2.5, foreground="white"), Normal()]
@@ -319,8 +319,7 @@ def _ends(place: Any, plane: MapPlane, found: Basins, level: float | None) -> se
 
 
 def letter_offsets(marks: Array, distance: float) -> list[tuple[float, float]]:
-    """Where the letter of each mark (n, 2) is, seen from it: of all directions the one in which it is farthest from the
-    other marks and from the letters before."""
+    """Return the offset of the letter of each mark (n, 2): the direction farthest from other marks and letters."""
     turns = 2 * np.pi * (np.arange(16) + 0.5) / 16
     ways = distance * np.column_stack([np.cos(turns), np.sin(turns)])
     taken, found = list(marks), list[tuple[float, float]]()
@@ -333,9 +332,9 @@ def letter_offsets(marks: Array, distance: float) -> list[tuple[float, float]]:
 
 
 def table(found: Basins) -> bytes:
-    """Comma-separated values: a line a start (metres, radians), what its run ended at, and whether it came to a
-    singularity; empty where the robot cannot start."""
-    rows: list[list[Any]] = [[*found.grid.names, "end", "ended", "damped"]]
+    """Return comma-separated values: a line per start (metres, radians), the outcome, and whether the run reached a
+    singularity; empty if the robot cannot start."""
+    rows: list[list[Any]] = [[*found.grid.names, "end", "outcome", "damped"]]
     places, marks = found.grid.places().tolist(), found.damped.ravel()
     for place, cell, damped in zip(places, found.cells.ravel(), marks, strict=True):
         told = ["", "", ""] if cell == NOT_REACHED else [LETTERS[cell], found.ends[cell].run_outcome.name, int(damped)]

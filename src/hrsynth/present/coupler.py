@@ -1,4 +1,4 @@
-"""What a point of a platform traces while two others slide on their curves: coupler curves and surfaces, to draw."""
+"""Coupler curves and surfaces, to draw: traces of a platform point while two others slide on their curves."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def _reach_point(one: Curve, other: Curve, length: float, s: Array) -> Array:
 
 
 def _border(one: Curve, other: Curve, length: float, low: float, high: float) -> float:
-    """Where the bar ceases to reach, between two parameters of which one is reached: the reached side."""
+    """Find the end of the reached interval between two parameters of which one is reached; return the reached side."""
     inside = bool(_reach_point(one, other, length, np.array([low]))[0])
     for _ in range(50):
         middle = (low + high) / 2

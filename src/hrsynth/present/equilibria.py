@@ -1,4 +1,4 @@
-"""All endings of a loop → a picture: the robot at the goal, and the platform at every pose that attracts."""
+"""Figure of the equilibria of a loop: the robot at the goal, and the platform at every stable equilibrium."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from .sketch import Sketch
 from .view.view import plane_normal
 
 WIDE, TALL, EDGE, SCALES = 7.2, 6.4, 0.2, 0.8
-"""Width and height of the picture, its margin, and the room for the scales (inches)."""
+"""Width and height of the figure, its margin, and the room for the scales (inches)."""
 WITHIN = 1.6
-"""How far from the middle of the robot a rest may be to be drawn, as a multiple of the robot's size."""
+"""Distance from the middle of the robot up to which equilibria are drawn, over the extent of the robot."""
 LOOKS: dict[str, dict[str, Any]] = {
     "goal": {"color": palette.colour("goal"), "marker": "*", "markersize": 13},
     "assembly mode": {"color": palette.colour("mode"), "marker": "D", "markersize": 8},
@@ -29,17 +29,17 @@ LOOKS: dict[str, dict[str, Any]] = {
 }
 BASE: dict[str, Any] = {"color": "black", "marker": "s", "markersize": 4}
 WORDS = {
-    "goal": "the goal",
-    "assembly mode": "another mode",
+    "goal": "goal",
+    "assembly mode": "other assembly mode",
     "antipodal": "antipodal pose",
-    "critical": "pose with an error that attracts",
-    "other": "rest that does not attract",
+    "critical": "nonzero error, stable",
+    "other": "saddle or unstable",
 }
 
 
 @in_style
 def picture(found: Equilibria, paper: Paper = PNG) -> bytes:
-    """The endings as a figure on ``paper``."""
+    """Draw the equilibria as a figure on ``paper``."""
     goal, platform = found.goal, found.setup.decomposition.platform
     mechanism, motion = goal.model.mechanism, found.setup.motion
     ground = np.array([joint.point for joint in mechanism.joints_of(mechanism.base)])
@@ -56,11 +56,11 @@ def picture(found: Equilibria, paper: Paper = PNG) -> bytes:
     every = np.vstack([extent, *(p for _, p in near), *(stroke for _, some in shapes for stroke in some)])
     figure = empty_figure(paper.wide(WIDE), TALL)
     far = len(drawn) - len(near)
-    beyond = f"; {far} more farther away" if far else ""
+    beyond = f"; {far} farther away not drawn" if far else ""
     word = "legs " if all(each.by_segment for each in found.setup.observed) else ""
     title = figure.suptitle(
         f"{found.setup.robot.name}, {word}{', '.join(found.setup.labels)} observed, goal "
-        f"{pose_words(found.pose)}\n{len(found.stable)} of {len(found.points)} rests attract"
+        f"{pose_words(found.pose)}\n{len(found.stable)} of {len(found.points)} equilibria stable"
         f"{beyond}",
         va="top",
     )
@@ -72,7 +72,7 @@ def picture(found: Equilibria, paper: Paper = PNG) -> bytes:
         *(entry(WORDS[k], linestyle="", **LOOKS[k]) for k in kinds),
     ]
     if shapes:
-        entries.append(entry("platform where it attracts (in its colour)", color="black", linewidth=1.6))
+        entries.append(entry("platform at stable equilibria (in their colour)", color="black", linewidth=1.6))
     low = legend_within(figure, entries, figure.get_figwidth(), loc="lower center")
     wide, tall = figure.get_figwidth(), figure.get_figheight()
     box = (SCALES / wide, (low + SCALES) / tall, 1 - (SCALES + EDGE) / wide, 1 - (low + SCALES + above + EDGE) / tall)
@@ -91,7 +91,7 @@ def picture(found: Equilibria, paper: Paper = PNG) -> bytes:
 
 
 def look(each: Equilibrium) -> str:
-    """As which kind a rest is drawn."""
+    """Return the kind as which an equilibrium is drawn."""
     return each.kind if each.kind != CRITICAL or each.stability == STABLE else "other"
 
 
@@ -100,7 +100,7 @@ def _outlines(at: ClosedConfiguration, platform: Any) -> list[Any]:
 
 
 def _sights(found: Equilibria, at: ClosedConfiguration) -> list[Any]:
-    """What is observed that is no segment, as lines in space."""
+    """Return the observations other than segments, as lines in space."""
     reference, size = found.setup.mechanism.reference, at.model.length / 2
     return [
         line

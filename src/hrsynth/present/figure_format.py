@@ -1,4 +1,4 @@
-"""What figures are printed on: their file, width, size of text and font; how they are laid out where it is narrow."""
+"""Format of figures: file, width, text size and font, and the layout of narrow ones."""
 
 from __future__ import annotations
 
@@ -17,8 +17,7 @@ from ..errors import BadRequest
 from .sketch import NAME_ON_AXIS, NUMBER_ON_AXIS
 
 USUAL, PRINTED = 10.0, 8.0
-"""Size of text (points) with which figures are laid out, and with which they are printed at least unless one is asked
-for."""
+"""Text size (points) of the layout, and smallest text size of a figure unless another is requested."""
 BESIDE, AXES, LEAST = 2.3, 5.0, 3.2
 """Room for a legend beside the axes, what must be left to them, and the narrowest layout (inches with usual text)."""
 BORDER = 0.15
@@ -30,7 +29,7 @@ WIDTHS, TEXTS = (1.0, 40.0), (4.0, 40.0)
 
 @dataclass(frozen=True)
 class Paper:
-    """How a figure is printed: the ending of its file, its width (inches), the size (points) of its text and its font;
+    """Format of a figure: the suffix of its file, its width (inches), the size (points) of its text and its font;
     None: as it was made. Figures are laid out with text of the usual size in the ``room`` that this leaves, and then
     scaled as a whole."""
 
@@ -45,8 +44,8 @@ class Paper:
         return inf if self.width is None else self.width * USUAL / (self.size or PRINTED)
 
     def wide(self, natural: float) -> float:
-        """The width (inches) of a layout that has ``natural`` where it is free: all of the room where the size of the
-        text is asked for too."""
+        """Return the width (inches) of a layout that has ``natural`` if it is free: all of the room if the text size is
+        requested too."""
         return self.room if self.width is not None and self.size is not None else min(natural, self.room)
 
     def axes(self, natural: float, least: float = AXES) -> float:
@@ -56,7 +55,7 @@ class Paper:
         return rest if rest >= max(AXES, least) else self.wide(natural)
 
     def columns(self, most: int, side: float) -> int:
-        """How many axes, of ``side`` inches at least, stand beside each other."""
+        """Return the number of axes, of ``side`` inches at least, that fit beside each other."""
         return most if self.room == inf else max(1, min(most, int(self.room / side)))
 
     def fit(self, figure: Any) -> None:
@@ -80,8 +79,8 @@ PNG = Paper()
 
 
 def paper_for(ending: str, width: str | None, font: str | None) -> Paper:
-    """What a figure is printed on: ``width`` as 88mm, 8.8cm or 3.5in, ``font`` as a name, a size (8pt) or both
-    (Times 8pt). Raises ``BadRequest``."""
+    """Return the format of a figure: ``width`` as 88mm, 8.8cm or 3.5in, ``font`` as a name, a size (8pt) or both
+    (Times 8pt). Raise ``BadRequest``."""
     inches = size = None
     if width is not None:
         found = re.fullmatch(r"(\d+\.?\d*) *(mm|cm|in)", width.strip(), re.ASCII)

@@ -1,5 +1,4 @@
-"""Values over a line, plane or box of poses → pictures and tables: how far a singularity is, where a freedom is lost,
-how large errors are (MMT Figs. 19-21)."""
+"""Figures and tables over poses: singularity distance, Type 2 locus, errors (MMT Figs. 19-21)."""
 
 from __future__ import annotations
 
@@ -49,32 +48,32 @@ MARKS = {
     "type2": ("o", "Type 2"),
     "type3": ("D", "Type 3"),
     CONSTRAINT: ("s", "constraint singularity"),
-    UNDECIDED: ("X", "not decided"),
+    UNDECIDED: ("X", "undecided"),
 }
-"""Marks of singular poses by their state."""
+"""Markers of singular poses by state."""
 VALUE = "smallest singular value of Mᵀ"
 LOCI = {"hidden robot": (palette.colour("actuator"), "solid", "o"), "real robot": (palette.PAGE["ink"], "dashed", "s")}
 NEAR_TYPE_1 = 0.5
-"""Fraction of its median to which the distance to Type 1 falls at a boundary of that kind."""
+"""Fraction of its median below which the Type 1 distance marks a boundary of that kind."""
 ERRORS = "cividis"
-"""A scale that readers with any colour vision see in the same order."""
+"""Colour scale with the same order for any colour vision."""
 STROKES = (("black", 3.4), ("white", 1.6))
-"""Colours and widths of a line that is seen on any colour, drawn one over the other."""
+"""Colours and widths of a line that is visible on any colour, drawn over each other."""
 HIGHEST = 30.0
-"""Multiple of the median error at which the scale ends."""
+"""End of the scale, as a multiple of the median error."""
 
 
 @in_style
 def distance_map(found: Check, paper: Paper = PNG) -> bytes:
-    """The distance to Type 2 singularities over a grid: a curve for a line of poses, a colour map for a plane, one map
-    for each value of the third part for a box. Raises ``BadRequest`` where Mᵀ exists nowhere."""
+    """Draw the Type 2 distance over a grid: a curve for a line of poses, a colour map for a plane, several for a box.
+
+    Raise ``BadRequest`` if Mᵀ exists nowhere."""
     grid = found.grid
     assert grid is not None
     if all(value is None for value in grid.values("type2")):
         raise BadRequest(
             f"{found.setup.robot.name}: there is nothing to draw: Mᵀ exists nowhere",
-            None,
-            "another grid, or a table (.csv)",
+            remedy="Choose another grid, or write a table (.csv).",
         )
     numbers = np.array([np.nan if value is None else value for value in grid.values("type2")]).reshape(grid.grid.shape)
     states = np.array(grid.states).reshape(grid.grid.shape)
@@ -93,14 +92,14 @@ def distance_map(found: Check, paper: Paper = PNG) -> bytes:
     plots.legend(figure, entries, paper)
     heading(
         figure,
-        f"{found.setup.robot.name}: distance to Type 2 singularities, legs {', '.join(found.setup.labels)} observed",
+        f"{found.setup.robot.name}: Type 2 distance, legs {', '.join(found.setup.labels)} observed",
         grid.grid.fixed,
     )
     return print_figure(figure, paper)
 
 
 def _robot(figure: Any, grid: Grid, setup: ObservedRobot) -> list[Any]:
-    """Draw the robot in the maps of a grid; its entry in the legend."""
+    """Draw the robot in the maps of a grid; return its entry in the legend."""
     return (
         [] if grid.ndim == 1 else MapPlane.of(grid.axes, setup.motion, 0.3, 2.0).robot(figure, setup.all_samples.start)
     )
@@ -121,7 +120,7 @@ def _distance_maps(
 
 
 def _distances(place: Any, plane: MapPlane, numbers: Array, states: NDArray[np.str_], norm: Any) -> None:
-    """One plane: colours, white where there is no Mᵀ, marks on singular cells."""
+    """Draw one plane: colours, white without Mᵀ, markers on singular cells."""
     plane.cells(place, numbers, norm=norm, cmap="viridis")
     blank = (states != UNREACHABLE) & ~np.isfinite(numbers)
     plane.cells(place, np.where(blank, 1.0, np.nan), cmap="gray", vmin=0, vmax=1)
@@ -163,7 +162,7 @@ def _distance_curve(grid: GridCheck, numbers: Array, states: NDArray[np.str_], p
 
 
 def _scale(numbers: Array) -> tuple[float, float, Array]:
-    """The ends of a logarithmic scale for values that may be zero, and places for its ticks."""
+    """Return the ends and ticks of a logarithmic scale for values that may be zero."""
     high = float(np.nanmax(numbers)) or 1.0
     regular = numbers[numbers > DISTANCE_FLOOR * high]
     low = float(regular.min()) if regular.size else DISTANCE_FLOOR * high
@@ -172,7 +171,7 @@ def _scale(numbers: Array) -> tuple[float, float, Array]:
 
 
 def check_table(found: Check) -> bytes:
-    """Comma-separated values: a line a pose (metres, radians), its state, and what was measured there."""
+    """Return comma-separated values: a line per pose (metres, radians), its state, and the values there."""
     assert found.grid is not None
     grid = found.grid
     given = [name for name in PARTS if grid.grid.poses()[0].given.get(name)]
@@ -185,14 +184,14 @@ def check_table(found: Check) -> bytes:
 
 
 def require_plane(setup: ObservedRobot, plane: Pose | str | None = None, **_: Any) -> None:
-    """Raise what is wrong with the plane, or why there is no locus."""
+    """Raise the error of the plane, or the reason why there is no locus."""
     from ..analysis.singularity.locus import require_plane
 
     require_plane(setup, plane)
 
 
 def locus(found: Singularity, plane: Pose | str | None, steps: int, seed: int) -> Locus:
-    """Where a freedom is lost over a plane of poses."""
+    """Compute the Type 2 locus over a plane of poses."""
     from ..analysis.singularity.locus import locus
 
     return locus(found.setup, plane=plane, steps=steps, seed=seed)
@@ -200,7 +199,7 @@ def locus(found: Singularity, plane: Pose | str | None, steps: int, seed: int) -
 
 @in_style
 def locus_map(found: Singularity, drawn: Locus, paper: Paper = PNG) -> bytes:
-    """Type 2 loci of the hidden and the real robot over a plane, the Type 1 boundary and what is not reached (PNG)."""
+    """Draw the Type 2 loci of the hidden and the real robot over a plane, the Type 1 boundary and unreached poses."""
     from matplotlib.patches import Patch
 
     plane = MapPlane.of(drawn.grid.axes, found.setup.motion, 0.4, 1.6)
@@ -219,7 +218,7 @@ def locus_map(found: Singularity, drawn: Locus, paper: Paper = PNG) -> bytes:
         if field is not None:
             entries.insert(0, _drawn_locus(place, plane, field, name))
     plane.finish(place, plane.x, plane.y)
-    entries += [Patch(facecolor="0.5", label="darker: nearer to Type 2"), *borders]
+    entries += [Patch(facecolor="0.5", label="darker: closer to Type 2"), *borders]
     if not np.isfinite(drawn.hidden.type2).all():
         entries.append(missing_entry())
     entries += plane.robot(figure, found.setup.all_samples.start)
@@ -233,7 +232,7 @@ def locus_map(found: Singularity, drawn: Locus, paper: Paper = PNG) -> bytes:
 
 
 def _drawn_locus(place: Any, plane: MapPlane, field: SingularityMap, name: str) -> Any:
-    """Draw where a freedom is lost, as a curve or as points; its entry in the legend."""
+    """Draw the Type 2 locus, as a curve or as points; return its entry in the legend."""
     colour, style, mark = LOCI[name]
     met = field.signed and plane.sign_change(place, field.value, colour, 2.0, style)
     if len(field.spots):
@@ -248,7 +247,7 @@ def _drawn_locus(place: Any, plane: MapPlane, field: SingularityMap, name: str) 
 
 
 def _boundary(place: Any, plane: MapPlane, drawn: Locus) -> list[Any]:
-    """The reached poses next to others that are not, in a colour near a Type 1 singularity; what the legend says."""
+    """Draw the boundary of the reached poses, coloured near a Type 1 singularity; return the entries of the legend."""
     reached = np.isfinite(drawn.hidden.type2)
     padded = np.pad(reached, 1, mode="edge")
     inside = padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
@@ -262,7 +261,7 @@ def _boundary(place: Any, plane: MapPlane, drawn: Locus) -> list[Any]:
     entries = []
     for cells, colour, words in (
         (border & near, palette.SERIES[1], "Type 1 boundary"),
-        (border & ~near, "black", "other limit of reach"),
+        (border & ~near, "black", "other workspace boundary"),
     ):
         i, j = np.nonzero(cells)
         if len(i):
@@ -273,17 +272,17 @@ def _boundary(place: Any, plane: MapPlane, drawn: Locus) -> list[Any]:
 
 @in_style
 def error_map(found: Accuracy, paper: Paper = PNG) -> bytes:
-    """Position and orientation errors (the latter where there are any): maps with the singular locus and the border of
-    what is reached drawn over for a plane, a row of maps for a box, curves for a line (PNG)."""
+    """Draw position and orientation errors: maps with the Type 2 locus and the workspace boundary for a plane, a row of
+    maps for a box, curves for a line."""
     field = found.field
     assert field is not None
     shown = [
         (1e3 * field.position, "largest position error (mm)"),
-        (np.degrees(field.orientation), "largest orientation error (degrees)"),
+        (np.degrees(field.orientation), "largest orientation error (deg)"),
     ]
     shown = [(values, label) for values, label in shown if np.nanmax(values, initial=0.0) > 0]
     if not shown:
-        raise BadRequest("there is nothing to draw", str(field.grid.fixed), "a robot whose platform has errors")
+        raise BadRequest("there is nothing to draw: the platform has no error", remedy="Choose another robot or grid.")
     figure, locus = (
         _error_curves(field, shown, paper)
         if field.grid.ndim == 1
@@ -299,7 +298,7 @@ def error_map(found: Accuracy, paper: Paper = PNG) -> bytes:
 def _error_maps(
     field: ErrorField, shown: list[tuple[Array, str]], motion: PlatformMotion, paper: Paper
 ) -> tuple[Any, bool]:
-    """The figure, and whether a place where a freedom is lost is in it."""
+    """Return the figure, and whether a Type 2 singularity is in it."""
     from matplotlib.colors import LogNorm
 
     made = PoseMap.of(field.grid, motion, paper, len(shown))
@@ -319,14 +318,14 @@ def _error_maps(
 
 
 def _ends(values: Array, highest: float = HIGHEST) -> tuple[float, float]:
-    """The ends of a logarithmic scale: the smallest error, and the largest unless that is far above the median."""
+    """Return the ends of a logarithmic scale: the smallest error, and the largest unless it is far above the median."""
     finite = values[np.isfinite(values) & (values > 0)]
     low, high = float(finite.min()), float(min(finite.max(), highest * np.median(finite)))
     return (low, high) if high > 1.01 * low else (0.9 * low, 1.1 * low)
 
 
 def _locus(field: ErrorField, places: Any, plane: MapPlane) -> bool:
-    """Draw where a freedom is lost, white on black; whether there is such a pose."""
+    """Draw the Type 2 locus, white on black; return True if there is one."""
     from ..analysis.accuracy.singular_search import singular_poses
 
     if field.determinant is not None:
@@ -344,7 +343,7 @@ def _locus(field: ErrorField, places: Any, plane: MapPlane) -> bool:
 
 
 def _draw_loss(place: Any, plane: MapPlane, determinant: Array) -> bool:
-    """Draw where a determinant changes its sign, white on black; whether it does."""
+    """Draw the sign changes of a determinant, white on black; return True if there is one."""
     return all([plane.sign_change(place, determinant, colour, width) for colour, width in STROKES])
 
 
@@ -369,7 +368,7 @@ def _error_curves(field: ErrorField, shown: list[tuple[Array, str]], paper: Pape
 
 
 def _error_entries(field: ErrorField, locus: bool) -> list[Any]:
-    """What white lines or points, black lines and hatching mean, of those that occur."""
+    """Return the legend entries of white lines or points, black lines and hatching."""
     from matplotlib.patheffects import Normal, Stroke
 
     entries: list[Any] = []
@@ -390,14 +389,14 @@ def _error_entries(field: ErrorField, locus: bool) -> list[Any]:
         entries.append(entry("Type 2 singularities are not drawn", linestyle=""))
     if not field.reached.all():
         if field.grid.ndim > 1:
-            entries.append(entry("border of what is reached", color="black", linewidth=1.6))
+            entries.append(entry("workspace boundary", color="black", linewidth=1.6))
         entries.append(missing_entry())
     return entries
 
 
 def error_table(found: Accuracy) -> Iterator[bytes]:
-    """Comma-separated values: a line a pose (metres, radians), empty where it is not reached, inf where a freedom is
-    lost."""
+    """Yield comma-separated values: a line per pose (metres, radians), empty if not reached, inf at Type 2
+    singularities."""
     field = found.field
     assert field is not None
     yield ",".join((*field.grid.names, "position_mm", "orientation_deg")).encode() + b"\n"

@@ -1,4 +1,4 @@
-"""All assembly modes → a picture: what decides them on the left, the robot at each of them on the right."""
+"""Figure of all assembly modes: the curves that intersect there, and the robot at each mode."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .scenes import CLOSES, GOAL, NEAR, OPEN, UNKNOWN, ModesScene, Placed, scene
 from .sketch import Box, Sketch
 
 MARKS = {
-    GOAL: ("*", 15.0, "the pose itself"),
+    GOAL: ("*", 15.0, "given pose"),
     CLOSES: ("o", 8.0, "mode, robot can be assembled"),
     OPEN: ("X", 9.0, "mode, robot cannot be assembled"),
     UNKNOWN: ("P", 8.0, "mode, assembly not found"),
@@ -52,7 +52,7 @@ LEAST_CELL = 1.3
 
 
 def picture(found: AssemblyModes, paper: Paper = PNG) -> bytes:
-    """The modes as a figure on ``paper``; of a PNG the text ``Description`` holds :func:`description` as JSON."""
+    """Draw the modes as a figure on ``paper``; the text ``Description`` of a PNG holds :func:`description` as JSON."""
     from PIL import Image
     from PIL.PngImagePlugin import PngInfo
 
@@ -71,24 +71,24 @@ def picture(found: AssemblyModes, paper: Paper = PNG) -> bytes:
 
 
 def why_undrawn(found: AssemblyModes) -> str | None:
-    """Why there is nothing to draw: a formation, a continuum of modes, or none at all."""
+    """Return why there is nothing to draw: a formation, a continuous family of modes, or no mode."""
     if found.formation is not None:
-        return "a formation has no platform on which to draw the ends of legs"
+        return "a formation has no platform with attachment points"
     if found.found.continuous_family is not None or not (found.modes or found.near_modes):
         return found.found.singular_solutions or "there is no mode"
     return None
 
 
 def drawable(found: AssemblyModes) -> ModesScene:
-    """What there is to draw; raises ``BadRequest`` where there is nothing."""
+    """Return the scene to draw; raise ``BadRequest`` if there is none."""
     why = why_undrawn(found)
     if why is not None:
-        raise BadRequest(f"{found.setup.robot.name}: there is nothing to draw: {why}", None, "isolated modes")
+        raise BadRequest(f"{found.setup.robot.name}: there is nothing to draw: {why}")
     return scene(found)
 
 
 def description(found: AssemblyModes, drawn: ModesScene) -> dict[str, Any]:
-    """What was asked for and what is drawn, in a few numbers: enough to tell whether a picture is out of date."""
+    """Return the request and the drawn points in a few numbers, which show whether a figure is out of date."""
     return {
         "robot": found.setup.robot.name,
         "observe": list(found.setup.labels),
@@ -101,7 +101,7 @@ def description(found: AssemblyModes, drawn: ModesScene) -> dict[str, Any]:
 
 @in_style
 def figure(found: AssemblyModes, drawn: ModesScene, paper: Paper = PNG) -> Any:
-    """The picture as a matplotlib figure: the robots beside the curves, or below where the paper is narrow."""
+    """Draw the matplotlib figure: the robots beside the curves, or below if the paper is narrow."""
     placed = drawn.placed[:MOST]
     columns, rows = _grid(len(placed))
     wide = paper.wide(LEFT + SIDE + GAP + columns * SIDE / rows)
@@ -166,7 +166,7 @@ def _colour(k: int) -> str:
 
 
 def _curves(sketch: Sketch, whole: Any, box: Box, drawn: ModesScene) -> None:
-    """What decides the modes, the platform at each (in a plane the robot), and their numbers."""
+    """Draw the curves, the platform at each mode (in a plane the robot), and the numbers."""
     few = len(drawn.placed) <= FEW
     legs = [each.strokes if few and sketch.flat else () for each in drawn.placed]
     platforms = [each.platform if few else () for each in drawn.placed]
@@ -225,12 +225,9 @@ def _heading(whole: Any, found: AssemblyModes, drawn: ModesScene) -> float:
     many += f"; {len(found.near_modes)} near" if found.near_modes else ""
     many += f"; the first {MOST} drawn as robots" if len(drawn.placed) > MOST else ""
     if drawn.rest:
-        many += f"\nof the points where the curves meet, only these fit leg{'s' * (len(drawn.rest) > 1)} "
-        many += ", ".join(drawn.rest) + " as well"
-    title = (
-        f"{setup.robot.name}   {setup.decomposition.architecture()}\nassembly modes with the same {held} as at "
-        f"{found.pose}: {many}"
-    )
+        many += f"\nonly these intersections of the curves match leg{'s' * (len(drawn.rest) > 1)} "
+        many += ", ".join(drawn.rest) + " too"
+    title = f"{setup.robot.name}   {setup.decomposition.architecture()}\nassembly modes with fixed {held}: {many}"
     return settle_title(whole, whole.suptitle(title, fontsize=12, va="top"))
 
 
@@ -260,6 +257,6 @@ def _legend(whole: Any, drawn: ModesScene) -> float:
             words, linestyle="", marker=mark, markersize=0.8 * size, color="0.6", markeredgecolor="black"
         )
     if any(each.platform for each in drawn.placed):
-        entries["platform"] = entry("platform (in the mode's colour)", color=COLOURS[0], linewidth=2.4)
+        entries["platform"] = entry("platform (in the colour of the mode)", color=COLOURS[0], linewidth=2.4)
     entries["ground"] = entry("joints of the base", linestyle="", marker="s", color="black", markersize=3.4)
     return legend_within(whole, list(entries.values()), whole.get_figwidth(), loc="lower center")

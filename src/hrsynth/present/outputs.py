@@ -1,8 +1,7 @@
-"""The outputs of each kind of answer, stated once: its text, its pictures, the files that it is written to, and what
-they need. Prompts, notebooks and the command line take them from here.
+"""Outputs of each kind of result: text, figures, files and their requirements, for prompts, notebooks and commands.
 
-What makes an output is named as ``module:function`` of this folder, or with a dot before it of the package, and loaded
-when it is wanted.
+The maker of an output is named ``module:function`` of this folder, or with a dot before it of the package, and loaded
+on use.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ FIGURES = (PNG, ".pdf", ".svg")
 
 
 def function(name: str | Callable[..., Any]) -> Callable[..., Any]:
-    """The function ``module:function`` of this folder, ``.module:function`` of the package, or one as it is."""
+    """Return the function ``module:function`` of this folder or ``.module:function`` of the package."""
     if callable(name):
         return name
     module, _, attribute = name.partition(":")
@@ -37,18 +36,18 @@ def function(name: str | Callable[..., Any]) -> Callable[..., Any]:
 
 @dataclass(frozen=True, eq=False)
 class File:
-    """What an answer is written to: ``makers`` give the content by the file's ending, ``refusal`` says that there is
-    none. The command line has an ``option`` for it with its ``help`` (None: it has not), its JSON a ``field``.
+    """File of a result: ``makers`` return the content by the file's suffix, ``refusal`` is the message without one. The
+    command line has an ``option`` for it with its ``help`` (or None), its JSON a ``field``.
 
-    ``part`` names the part of the answer that is written, None where it was not asked for; then ``needs`` are the
-    options that ask for it, and ``words`` what it is called. ``computed`` is made of the answer first, with the options
-    that it ``asks`` for and the seed; the makers get it too, and the JSON as ``record``.
+    ``part`` names the part of the result that is written, None if it was not requested; then ``needs`` are the options
+    that request it, and ``words`` its name. ``computed`` is computed from the result first, with the options ``asks``
+    and the seed; the makers get it too, and the JSON as ``record``.
     """
 
     refusal: str
     makers: Mapping[str, str | Callable[..., Any]]
     holds: str = ""
-    """What it holds: the subject of the sentence that tells where it is written."""
+    """Content: the subject of the sentence that reports where it is written."""
     help: str = ""
     option: str | None = "output"
     field: str | None = "file"
@@ -60,45 +59,43 @@ class File:
     asks: tuple[Option, ...] = ()
     record: str | None = None
     nothing: str | None = None
-    """Tells why there is nothing to draw in an answer, or None."""
+    """Function that returns why there is nothing to draw in a result, or None."""
     drawn: bool = False
-    """Whether it is a figure, of which width and font can be asked for."""
+    """True for a figure with options for width and font."""
     installed: tuple[str, str] | None = None
-    """An ending, and what raises ``MissingExtra`` where a library for it is missing."""
+    """Suffix, and function that raises ``MissingExtra`` if its library is missing."""
     limited: tuple[tuple[str, ...], str] | None = None
-    """Endings, and what raises ``BadRequest`` for an observed robot, with the options, that cannot be drawn so."""
+    """Suffixes, and function that raises ``BadRequest`` for an observed robot that cannot be drawn with the options."""
     plotted: tuple[str, ...] = (".png", ".svg", ".pdf")
-    """The endings that are drawn with matplotlib."""
+    """Suffixes that are drawn with matplotlib."""
     streamed: tuple[str, str] | None = None
-    """An ending that is written part by part while the question is answered, and the parameter that names the file."""
+    """Suffix that is written in parts during the analysis, and the parameter that names the file."""
 
     @property
     def takes(self) -> tuple[str, ...]:
-        """The names of what it asks for."""
+        """Names of its options."""
         return tuple(each.name for each in self.asks)
 
     def require(self, path: str | None, asked: Asked) -> None:
-        """Raise ``BadRequest`` where there is nothing to write, the ending is no format or the file cannot be written,
-        and ``MissingExtra``: before long work, not after it."""
+        """Raise ``BadRequest`` if there is nothing to write, the suffix is unknown or the file cannot be written, and
+        ``MissingExtra``; called before long work."""
         from ..description.files import require_writable
 
         for name in ("width", "font") if self.drawn else ():
             if asked.get(name) is not None and (path is None or Path(path).suffix.lower() not in FIGURES):
-                raise BadRequest(f"--{name} is of a figure", asked[name], f"--output with {', '.join(FIGURES)}")
+                raise BadRequest(
+                    f"--{name}: no figure is written", asked[name], remedy=f"Add --output with {', '.join(FIGURES)}."
+                )
             if asked.get(name) is not None:
                 function("figure_format:paper_for")(PNG, asked.get("width"), asked.get("font"))
         if path is None:
             if asked.get("plane") is not None and "plane" in self.takes:
-                raise BadRequest(
-                    "--plane says what a figure shows, and no figure is asked for",
-                    asked["plane"],
-                    "-o FILE.png besides",
-                )
+                raise BadRequest("--plane: no figure is written", asked["plane"], remedy="Add -o FILE.png.")
             return
         ending = Path(path).suffix.lower()
         if self.needs and all(asked[name] is None for name in self.needs):
             options = " or ".join(f"--{name}" for name in self.needs)
-            raise BadRequest(f"only {self.words} is written", path, f"--output together with {options}")
+            raise BadRequest(f"--output: only {self.words} is written", path, remedy=f"Add {options}.")
         known = (*self.makers, *(self.streamed or ())[:1])
         if ending not in known:
             raise BadRequest(f"{self.refusal}: unknown extension", path, self.allowed or known)
@@ -109,7 +106,7 @@ class File:
         require_writable(path)
 
     def require_drawable(self, path: str | None, robot: Any, asked: Asked) -> None:
-        """Raise ``BadRequest`` where what is asked for of a robot cannot be drawn so: before long work as well."""
+        """Raise ``BadRequest`` if the robot cannot be drawn with the options; called before long work."""
         if path is not None and self.limited is not None and Path(path).suffix.lower() in self.limited[0]:
             from ..analysis.observed import ObservedRobot
 
@@ -117,22 +114,22 @@ class File:
             function(self.limited[1])(ObservedRobot.of(robot, **watched), **{name: asked[name] for name in self.takes})
 
     def question_fields(self, path: str | None) -> dict[str, str]:
-        """What the question is told of a file that it writes itself."""
+        """Return the parameter of an analysis that writes the file itself."""
         if path is None or self.streamed is None or Path(path).suffix.lower() != self.streamed[0]:
             return {}
         return {self.streamed[1]: path}
 
     def sentence(self, path: str) -> str:
-        """The sentence that tells where it was written."""
+        """Report where it was written."""
         return f"{self.holds} is written to {path}."
 
     def unwritten(self, found: Any, path: str) -> str | None:
-        """What is to be said where there is nothing to write."""
+        """Return the message if there is nothing to write."""
         why = None if self.nothing is None else function(self.nothing)(found)
         return None if why is None else f"{path} is not drawn: {why}"
 
     def content(self, found: Any, ending: str, asked: Asked) -> tuple[Content, dict[str, Any]]:
-        """The file's content and what the JSON says more; raises ``BadRequest`` where there is nothing to draw."""
+        """Return the content of the file and further JSON fields; raise ``BadRequest`` if there is nothing to draw."""
         maker = function(self.makers[ending])
         if ending in FIGURES and self.drawn:
             maker = partial(
@@ -144,7 +141,7 @@ class File:
         return maker(found, value), {} if self.record is None else {self.record: value.to_dict()}
 
     def writer(self, found: Any, path: str, asked: Asked) -> tuple[Callable[[], object], dict[str, Any]]:
-        """What writes the file, whole or not at all, once all else is done, and what the JSON says more."""
+        """Return a function that writes the file, completely or not at all, and further JSON fields."""
         from ..description.files import write_whole
 
         if self.question_fields(path):
@@ -154,56 +151,60 @@ class File:
 
 
 class HiddenFile(File):
-    """The hidden robot in any dialect."""
+    """File of the hidden robot in any format."""
 
     def require(self, path: str | None, asked: Asked) -> None:
-        """Raise ``BadRequest`` for an ending that is no dialect's."""
+        """Raise ``BadRequest`` for the suffix of no format."""
         from ..description import targets
 
         if path is not None:
             targets(path)
 
     def sentence(self, path: str) -> str:
-        """The sentence that names all files of a dialect."""
+        """Report all files of a format."""
         from ..description import targets
 
         return super().sentence(" and ".join(map(str, targets(path))))
 
     def unwritten(self, found: Any, path: str) -> str | None:
-        """What is to be said where there is no hidden robot."""
-        return "nothing was written: every leg is blind, there is no hidden robot" if found.hidden is None else None
+        """Return the message if there is no hidden robot."""
+        return (
+            "nothing was written: every observed direction is constant, there is no hidden robot"
+            if found.hidden is None
+            else None
+        )
 
     def writer(self, found: Any, path: str, asked: Asked) -> tuple[Callable[[], object], dict[str, Any]]:
-        """What writes the robot, and nothing more."""
+        """Return a function that writes the robot."""
         from ..description import save
 
         return partial(save, found.hidden, path), {}
 
 
 class CodeFile(File):
-    """A program in the language that is asked for."""
+    """File of source code in the requested language."""
 
     def require(self, path: str | None, asked: Asked) -> None:
-        """Raise ``BadRequest`` for an ending of another language as well."""
+        """Raise ``BadRequest`` also for the suffix of another language."""
         super().require(path, asked)
         endings = (".py",) if asked["lang"] == "numpy" else (".hpp", ".h")
         if path is not None and Path(path).suffix.lower() not in endings:
             raise BadRequest(
                 f"{self.refusal} of --lang {asked['lang']}: extension",
                 path,
-                f"{', '.join(endings)} (or another --lang)",
+                endings,
+                remedy="Change the extension or --lang.",
             )
 
 
 def figures(maker: str) -> dict[str, str]:
-    """One maker for all endings of a figure."""
+    """Return one maker for all suffixes of a figure."""
     return dict.fromkeys(FIGURES, maker)
 
 
 @dataclass(frozen=True)
 class Outputs:
-    """What there is of one kind of answer: ``text`` is called with it, ``inline`` makes HTML for a notebook, where that
-    is more than the text."""
+    """Outputs of one kind of result: ``text`` formats it, ``inline`` makes HTML for a notebook, if that differs."""
 
     text: str | Callable[..., str]
     files: tuple[File, ...] = ()
@@ -306,10 +307,10 @@ OUTPUTS = {
         "text.equilibria:equilibria",
         (
             File(
-                "cannot draw the endings",
+                "cannot draw the equilibria",
                 figures("equilibria:picture"),
-                "The picture of the endings",
-                "Draw the endings: equilibria.png, .pdf, .svg.",
+                "The figure of the equilibria",
+                "Draw the equilibria: equilibria.png, .pdf, .svg.",
                 drawn=True,
             ),
         ),
@@ -335,7 +336,7 @@ OUTPUTS = {
             File(
                 "cannot draw the modes",
                 figures("modes:picture"),
-                "The picture of the modes",
+                "The figure of the modes",
                 "Draw the modes: modes.png, .pdf, .svg.",
                 nothing="modes:why_undrawn",
                 drawn=True,
@@ -352,7 +353,7 @@ OUTPUTS = {
             File(
                 "cannot draw the run",
                 {**figures("runs:picture"), ".gif": "animations:animation"},
-                "The picture of the run",
+                "The figure of the run",
                 "Draw the run: curves (run.png, .pdf, .svg) or an animation (run.gif).",
                 allowed=".png, .pdf, .svg (curves) or .gif (camera view)",
                 drawn=True,
@@ -397,12 +398,12 @@ OUTPUTS = {
         inline="studio.saved:inline",
     ),
 }
-"""The outputs by the name under which a result is shown (:attr:`hrsynth.results.Result.shown_as`): that of its
-command, or of its kind where it is a part of an answer."""
+"""Outputs by the name under which a result is shown (:attr:`hrsynth.results.Result.shown_as`): its command, or its
+kind if it is a part of a result."""
 
 
 def outputs_of(name: str) -> Outputs:
-    """The outputs of a kind of answer: those of the table, else what its class draws and writes itself."""
+    """Return the outputs of a kind of result: those of the table, else those that its class defines."""
     if name in OUTPUTS:
         return OUTPUTS[name]
     kind = Result.answer_of(name)
@@ -412,7 +413,7 @@ def outputs_of(name: str) -> Outputs:
     if kind.rows is not Result.rows:
         makers[CSV] = _csv
     help = f"Write {name}{', '.join(makers)}."
-    file = File(f"cannot write the answer of {name}", makers, f"The answer of {name}", help, drawn=PNG in makers)
+    file = File(f"cannot write the result of {name}", makers, f"The result of {name}", help, drawn=PNG in makers)
     return Outputs(kind.text, (file,) if makers else ())
 
 

@@ -1,6 +1,6 @@
-"""All colours of pictures: one of each meaning, in the 3D scene, drawings, figures and pages alike.
+"""Palette: one colour for one meaning, in the 3D scene, drawings, figures and pages.
 
-Colours of meanings are told apart by all kinds of colour-blind eyes: a test simulates them (Machado 2009).
+The colours can be distinguished with all kinds of colour blindness: a test simulates them (Machado 2009).
 """
 
 from __future__ import annotations
@@ -14,21 +14,21 @@ MEANINGS = {
     "motor": ("motor", "#08594c"),
     "virtual": ("virtual link", "#ada4ff"),
     "actuator": ("virtual actuator", "#cd139b"),
-    "watched": ("watched direction", "#3d6ae9"),
-    "unwatched": ("direction that is not watched", "#b7d0ff"),
+    "observed": ("observed direction", "#3d6ae9"),
+    "unobserved": ("direction not observed", "#b7d0ff"),
     "mode": ("another assembly mode", "#05b2ca"),
     "goal": ("goal", "#723f11"),
-    "ellipsoid": ("error of the platform's point", "#6334b5"),
-    "frame": ("frame of base and platform, handles", "#000000"),
-    "unknown": ("platform: error not known", "#747278"),
+    "ellipsoid": ("error of the platform point", "#6334b5"),
+    "frame": ("frames of base and platform, handles", "#000000"),
+    "unknown": ("platform: error unknown", "#747278"),
     "step0": ("error very small", "#8ad7ac"),
     "step1": ("error small", "#f1df50"),
-    "step2": ("error middling", "#ed953c"),
+    "step2": ("error medium", "#ed953c"),
     "step3": ("error large", "#e04c3c"),
-    "step4": ("a freedom is lost, or nearly", "#5f1223"),
+    "step4": ("Type 2 singularity, or nearly", "#5f1223"),
     "background": ("background", "#f5f7fa"),
 }
-"""What each meaning is called in a legend, and its colour."""
+"""Label in legends and colour of each meaning."""
 PAGE = {
     "ink": "#1b2530",
     "soft": "#4d5a68",
@@ -44,30 +44,30 @@ PAGE = {
     "wrong": "#a3123a",
     "notice": "#fff3d6",
 }
-"""Text, lines and grounds of pages and drawings; what is pressed or chosen; good, partly good and bad news."""
+"""Text, lines and backgrounds of pages and drawings; pressed and selected elements; good, partial and bad results."""
 SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
-"""Of curves that only differ from each other, in the order of the style of all plots."""
+"""Colours of curves without a meaning, in the order of the style of all plots."""
 TINT = 0.4
-"""How much of its colour the inside of a symbol has, the rest is white."""
+"""Fraction of its colour inside a symbol; its complement is white."""
 
 
 def colour(meaning: str) -> str:
-    """The colour of a meaning."""
+    """Return the colour of a meaning."""
     return MEANINGS[meaning][1]
 
 
 def tint(colour: str, share: float = TINT) -> str:
-    """A colour mixed with white."""
+    """Mix a colour with white."""
     parts = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
     return "#" + "".join(f"{round(255 + share * (part - 255)):02x}" for part in parts)
 
 
 def css() -> str:
-    """The colours as variables of a style sheet."""
+    """Format the colours as variables of a style sheet."""
     every = {**PAGE, **{name: colour(name) for name in MEANINGS}, "driven": tint(colour("motor"))}
     return ":root { " + " ".join(f"--{name}: {value};" for name, value in every.items()) + " }\n"
 
 
 def js() -> str:
-    """The meanings as a script, for ``colours.js``."""
+    """Format the meanings as a script, for ``colours.js``."""
     return f"const COLOURS = {json.dumps(MEANINGS)};\n"

@@ -1,4 +1,4 @@
-"""What all plots share: figures, axes over parts of a pose, maps of values over a plane, what is not reached."""
+"""Common parts of all plots: figures, axes over coordinates of a pose, maps of values over a plane, unreached poses."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .sketch import Sketch, axis_label
 from .view.view import plane_normal
 
 STYLE = "hrsynth.present.style"
-"""The one style of all plots, ``style.mplstyle`` of this folder."""
+"""Style of all plots, ``style.mplstyle`` of this folder."""
 PAD = 0.07
 """Left free about axes, titles and legends (inches)."""
 FEWEST_TICKS = 3
@@ -35,19 +35,19 @@ Asked = ParamSpec("Asked")
 Given = TypeVar("Given")
 
 MISSING: dict[str, Any] = {"facecolor": "0.85", "edgecolor": "0.6", "hatch": "///"}
-"""How what is not reached is drawn."""
+"""Style of unreached poses."""
 ROBOT: dict[str, Any] = {"color": "black", "alpha": 0.3, "linewidth": 1.2}
 """How a robot is drawn in a map of its poses."""
 
 
 def library() -> None:
-    """Raise ``MissingExtra`` where matplotlib is not installed."""
+    """Raise ``MissingExtra`` if matplotlib is not installed."""
     if find_spec("matplotlib") is None:
         raise MissingExtra("drawing", "plots")
 
 
 def in_style(draw: Callable[Asked, Given]) -> Callable[Asked, Given]:
-    """A function that draws, in the style of all plots: names as they are, a ``$`` in them too."""
+    """Decorate a function that draws: style of all plots, names unchanged, a ``$`` in them too."""
 
     @wraps(draw)
     def drawn(*given: Asked.args, **named: Asked.kwargs) -> Given:
@@ -156,11 +156,11 @@ class MapPlane:
         return replace(made, tall=min(max(float(np.ptp(v) / np.ptp(u)), least), most))
 
     def spots(self, values: Array) -> tuple[Array, Array]:
-        """Where poses are drawn whose two parts have ``values`` (n, 2) (m, rad)."""
+        """Return the positions in the map of poses whose two coordinates have ``values`` (n, 2) (m, rad)."""
         return self.at(*(tick_values(name, column) for name, column in zip(self.names, values.T, strict=True)))
 
     def at(self, x: Array, y: Array) -> tuple[Array, Array]:
-        """Where values of the two parts (of one shape, angles in degrees) are drawn."""
+        """Return the positions in the map of values of the two coordinates (of one shape, angles in degrees)."""
         u, v = (row[0] * x + row[1] * y + start for row, start in zip(self.shear, self.offset, strict=True))
         return u, v
 
@@ -201,7 +201,7 @@ class MapPlane:
         )
 
     def sign_change(self, place: Any, values: Array, colour: str, width: float, style: str = "solid") -> bool:
-        """Draw where values change their sign; whether they do."""
+        """Draw the sign changes of values; return True if there is one."""
         if not np.nanmin(values) < 0 < np.nanmax(values):
             return False
         self.contour(place, values, 0.0, colour, width, style)
@@ -258,13 +258,13 @@ def along(place: Any, name: str, x: Array, missing: Array, label: str, which: st
 
 
 def heading(figure: Any, text: str, fixed: Pose, before: str = "\n") -> None:
-    """The title, and after it what the plot holds fixed, angles in degrees."""
+    """Set the title, followed by the fixed coordinates, angles in degrees."""
     words = pose_words(fixed)
     figure.suptitle(text + (f"{before}{words}" if words else ""))
 
 
 def pose_words(pose: Pose) -> str:
-    """A pose with its units, angles in degrees."""
+    """Format a pose with its units, angles in degrees."""
     told = Pose.parse(pose.shown) if pose.shown else pose
     return ", ".join(_held_parts(name, values) for name, values in told.given.items())
 
@@ -284,7 +284,7 @@ def entry(label: str, **style: Any) -> Any:
 
 
 def missing_entry() -> Any:
-    """What is not reached, in a legend."""
+    """Return the legend entry of unreached poses."""
     from matplotlib.patches import Patch
 
     return Patch(label="not reached", **MISSING)

@@ -1,4 +1,4 @@
-"""A robot in space as a drawing: rods, plates and joints at the zero configuration, seen from one side (SVG)."""
+"""Drawing of a robot in space: rods, plates and joints at the zero configuration, seen from one side (SVG)."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from .view.view import plane_normal
 TRAVEL = 0.3
 """Half of a rail that is drawn (characteristic lengths)."""
 SEEN = "seen"
-"""A link whose direction is watched."""
-STROKES = {BASE: (PAGE["edge"], 2.0), LEG: (PAGE["soft"], 3.0), PLATFORM: (svg.INK, 3.4), SEEN: (svg.WATCHED, 4.6)}
+"""Role of a link whose direction is observed."""
+STROKES = {BASE: (PAGE["edge"], 2.0), LEG: (PAGE["soft"], 3.0), PLATFORM: (svg.INK, 3.4), SEEN: (svg.OBSERVED, 4.6)}
 """Colour and width of what a link is (pixels at the full size of a drawing)."""
 FILLS = {BASE: PAGE["ground"], PLATFORM: PAGE["line"]}
 
@@ -39,7 +39,7 @@ class Mark:
 
 @dataclass(frozen=True, eq=False)
 class Portrait:
-    """What is drawn of a robot, about the middle of it; ``normal`` (3,) is that of the plane of motion, if any."""
+    """Marks of a drawn robot; ``normal`` (3,) is that of the plane of motion, if any."""
 
     name: str
     marks: tuple[Mark, ...]
@@ -76,7 +76,7 @@ class Portrait:
 
     @cached_property
     def axes(self) -> Array:
-        """Right, up and towards the eye, (3, 3) by rows, as :class:`~hrsynth.present.sketch.Sketch` sees it."""
+        """Return right, up and towards the viewer, (3, 3) by rows, as in :class:`~hrsynth.present.sketch.Sketch`."""
         areas = [mark.points for mark in self.marks if mark.kind == "area"]
         spots = np.vstack([mark.points for mark in self.marks if mark.kind == "dot"] or areas)
         seen = Sketch.of(self.normal, spots, areas)
@@ -112,7 +112,7 @@ class Portrait:
         motors = sum(mark.role == MOTOR for mark in self.marks)
         return (
             f"{self.name} at its zero configuration, the platform dark, {motors} motors green"
-            + (", the watched segments blue" if legs else "")
+            + (", the observed segments blue" if legs else "")
             + "."
         )
 

@@ -1,5 +1,5 @@
-"""A servo run → a picture: the robot at start, end and goal, and against time the errors, the platform's place, and how
-far a singularity is (MMT Figs. 22-29)."""
+"""Figure of a servo run: the robot at start, end and goal, and against time the errors, the position of the platform
+and the singularity distance (MMT Figs. 22-29)."""
 
 from __future__ import annotations
 
@@ -12,12 +12,14 @@ from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism.cameras import CameraObservation, NamedCamera
 from ..simulation.crossings import TYPE_2
+from ..simulation.outcome import ANTIPODAL, BOUNDARY, MINIMUM, MODE, SIGHT, TIME, UNDECIDED
+from ..simulation.outcome import GOAL as GOAL_REACHED
 from ..simulation.result import Servo
 from ..tolerances import REST_OF_RUN, UNMOVED
 from . import palette
 from .figure_format import PNG, Paper, legend_within, print_figure, settle_title, wrap
 from .palette import SERIES
-from .plots import empty_figure, entry, in_style, pose_words
+from .plots import empty_figure, entry, in_style
 from .skeleton import legs_of, outline
 from .sketch import Box, Sketch
 from .view.sights import REACH, eyes, half_picture
@@ -25,31 +27,31 @@ from .view.view import plane_normal
 
 STYLES = ("solid", "dashed", "dashdot", "dotted", "solid", "dashed")
 WIDE, TALL, LEAST_TALL, NARROW = 12.0, 7.4, 5.4, 8.0
-"""Width and height of the picture, its least height, and the width below which the curves stand under the robot."""
+"""Width and height of the figure, its least height, and the width below which the curves stand under the robot."""
 NAMES, LEGENDS, SCALES, BELOW, PANEL, GAP = 0.95, 1.2, 0.7, 0.55, 1.15, 0.2
 """Room left of the curves, right of them, left of the robot, below both, for a curve under the robot, and between."""
 SHARE, HSPACE = 0.56, 0.18
 """The robot's part of what is left of the width, and the space between two curves over the height of one."""
 START, END, GOAL = ("0.72", "solid"), (SERIES[1], "solid"), (palette.colour("goal"), (0, (4, 2)))
-"""Colour and stroke of the robot at these."""
+"""Colour and stroke of the robot at start, end and goal."""
 BASE: dict[str, Any] = {"color": "black", "marker": "s", "markersize": 4, "linestyle": ""}
 LONG_NAME = 8
 """Letters of a name from which on a legend is printed small."""
 PICTURE = 2.2
-"""Height of a camera's picture over that of a curve."""
+"""Height of a camera image over that of a curve."""
 LEAST_TURN = 0.01
 """Turns below this (degrees) are not drawn."""
 ENDS = {
-    "goal": "the goal",
-    "assembly mode": "another assembly mode",
-    "antipodal": "an antipodal pose",
-    "local minimum": "a local minimum",
-    "limit reached": "a boundary of the workspace",
-    "out of view": "a place from which a camera does not see all",
-    "time": "the end of its time",
-    "undecided": "a place that is not decided",
+    GOAL_REACHED: "goal",
+    MODE: "other assembly mode",
+    ANTIPODAL: "antipodal pose",
+    MINIMUM: "local minimum",
+    BOUNDARY: "limit reached",
+    SIGHT: "out of view",
+    TIME: "time limit",
+    UNDECIDED: "undecided",
 }
-"""Endings in words."""
+"""Labels of outcomes."""
 
 
 @in_style
@@ -59,11 +61,7 @@ def picture(found: Servo, paper: Paper = PNG) -> bytes:
     figure = empty_figure(paper.wide(WIDE), TALL)
     legs = ", ".join(found.setup.labels)
     word = "legs " if all(each.by_segment for each in found.setup.observed) else ""
-    title = figure.suptitle(
-        f"{found.setup.robot.name}, {word}{legs} observed: ended at {ENDS[found.outcome]}\n"
-        f"from {pose_words(found.start)} to {pose_words(found.goal)}",
-        va="top",
-    )
+    title = figure.suptitle(f"{found.setup.robot.name}, {word}{legs} observed: {ENDS[found.outcome]}", va="top")
     x, y, wide, tall = _robots(figure, found, settle_title(figure, title), len(panels))
     title.set_y(1 - GAP / 2 / figure.get_figheight())
     pictures = _pictures(found)
@@ -83,7 +81,7 @@ def picture(found: Servo, paper: Paper = PNG) -> bytes:
         place.set(xlim=(0, until(found) or 1.0), **({} if bottom is None else {"ylim": (bottom, None)}))
         if len(curves) > 1 or curves[0][0]:
             place.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), **_small(curves))
-    still = "" if until(found) >= times[-1] else f"; nearly still until {times[-1]:.3g} s"
+    still = "" if until(found) >= times[-1] else f"; nearly no motion until {times[-1]:.3g} s"
     place.set_xlabel(f"time (s){still}")
     for number, (eye, half) in enumerate(pictures):
         part = share / len(pictures)
@@ -94,7 +92,7 @@ def picture(found: Servo, paper: Paper = PNG) -> bytes:
 
 
 def _pictures(found: Servo) -> list[tuple[NamedCamera, Array]]:
-    """The cameras that see something, and half of their pictures where these have a size."""
+    """Return the cameras with a visible observation, and half of their image sizes."""
     every = eyes(found.setup)
     seen = [(eye, half_picture(eye)) for eye in every]
     return [(eye, half) for eye, half in seen if _seen_by(found, eye)]
@@ -115,7 +113,7 @@ def _poses(found: Servo, seen: CameraObservation, at: ClosedConfiguration) -> tu
 
 
 def _picture(place: Any, found: Servo, eye: NamedCamera, half: Array) -> None:
-    """What the camera sees: the ways of the middles of what is seen, and all of it at start, end and goal."""
+    """Draw a camera image: the paths of the observations' middles, and the observations at start, end and goal."""
     size = REACH * found.target.model.length
     states = [(found.run.configurations[0], START), (found.settled, END), (found.target, GOAL)]
     for number, seen in enumerate(_seen_by(found, eye)):
@@ -134,19 +132,19 @@ def _picture(place: Any, found: Servo, eye: NamedCamera, half: Array) -> None:
     else:
         place.invert_yaxis()
     place.set_aspect("equal", adjustable="box" if sized else "datalim")
-    place.set_xlabel(f"picture of {eye.name}: x = X/Z", fontsize=9)
+    place.set_xlabel(f"image of {eye.name}: x = X/Z", fontsize=9)
     place.set_ylabel("y = Y/Z", fontsize=9)
     place.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), **_small([(o.leg,) for o in _seen_by(found, eye)]))
 
 
 def _small(named: Sequence[tuple[Any, ...]]) -> dict[str, Any]:
-    """What makes a legend narrow that has long names."""
+    """Return the style of a narrow legend for long names."""
     return {"fontsize": 7, "handlelength": 1.2} if any(len(each[0]) > LONG_NAME for each in named) else {}
 
 
 def _layout(figure: Any, entries: list[Any], above: float, panels: int) -> tuple[Box, Box]:
-    """Draw the legend, make the figure as tall as is wanted below a title of this height (inches), and say where the
-    robot is drawn and where the curves: beside it, or under it where the figure is narrow."""
+    """Draw the legend, set the height of the figure below a title of height ``above`` (inches); return the boxes of the
+    robot and of the curves, beside it, or below if the figure is narrow."""
     wide = figure.get_figwidth()
     rest = wide - SCALES - NAMES - LEGENDS
     if wide >= NARROW:
@@ -172,16 +170,16 @@ Curve = tuple[str, Array, str, str]
 
 
 def _panels(found: Servo) -> Iterator[tuple[str, list[Curve], float | None]]:
-    """What is drawn against time: its name, its curves, the lower end of its scale."""
+    """Yield what is drawn against time: name, curves, lower end of the scale."""
     names = [f"leg {each.leg}" if each.by_segment else each.leg for each in found.setup.observed]
     yield "error ‖eᵢ‖", [(name, found.errors[:, i], SERIES[i % 6], STYLES[i % 6]) for i, name in enumerate(names)], 0.0
     path, goal = found.way, found.goal_position
     moved = [i for i in range(3) if np.ptp(path[:, i]) > UNMOVED or abs(path[-1, i] - goal[i]) > UNMOVED] or [0]
     yield "position − goal (m)", [("xyz"[i], path[:, i] - goal[i], SERIES[i], STYLES[i]) for i in moved], None
     if np.degrees(found.turns.max()) > LEAST_TURN:
-        yield "turn from goal\n(degrees)", [("", np.degrees(found.turns), SERIES[0], "solid")], 0.0
+        yield "rotation from\ngoal (deg)", [("", np.degrees(found.turns), SERIES[0], "solid")], 0.0
     if np.isfinite(found.track.smallest).any():
-        yield "distance to the\nsingularity (Mᵀ)", [("", found.track.smallest, SERIES[3], "solid")], 0.0
+        yield "singularity\ndistance (Mᵀ)", [("", found.track.smallest, SERIES[3], "solid")], 0.0
 
 
 def until(found: Servo) -> float:
@@ -202,21 +200,21 @@ def _robots(figure: Any, found: Servo, above: float, panels: int) -> Box:
     path = found.way
     every = np.vstack([ground, path, *(stroke for each, _ in drawn for stroke, _ in each)])
     sketch = Sketch.of(plane_normal(found.setup.motion), ground, [])
-    entries = [entry("way of the platform", color=SERIES[0]), entry("joints of the base", **BASE)]
+    entries = [entry("path of the platform", color=SERIES[0]), entry("joints of the base", **BASE)]
     if any(np.ptp(stroke, axis=0).any() for each, _ in drawn for stroke, _ in each):
         entries[:0] = [
             entry("robot at the start", color=START[0]),
-            entry("robot where it ended", color=END[0]),
+            entry("robot at the end", color=END[0]),
             entry("robot at the goal", color=GOAL[0], linestyle="dashed"),
         ]
     inside = others[np.all((others >= every.min(axis=0) - 1e-9) & (others <= every.max(axis=0) + 1e-9), axis=1)]
-    marks = [(inside, "D", palette.colour("mode"), "other modes of the goal"), (path[-1:], "o", SERIES[1], "")]
+    marks = [(inside, "D", palette.colour("mode"), "other assembly modes of the goal"), (path[-1:], "o", SERIES[1], "")]
     marks += [
         (
             path[each.place][None],
             "x",
             palette.colour("step4"),
-            "crossing a singularity" if each.kind == TYPE_2 else "crossing a limit",
+            "crossing a Type 2 singularity" if each.kind == TYPE_2 else "crossing a Type 1 singularity",
         )
         for each in found.track.passages or ()
     ]

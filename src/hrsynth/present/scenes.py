@@ -1,4 +1,4 @@
-"""All assembly modes → what a picture of them shows, as points in the base frame (m).
+"""Scene of all assembly modes, as points in the base frame (m).
 
 Which curves and surfaces are drawn follows from how the platform moves (proofs.md 8; MMT Figs. 5, 7, 11, 15).
 """
@@ -41,8 +41,8 @@ class Trace:
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """One mode: its number as in the text, its state, what is to be said of it, the marked point (3,), the outlines of
-    the platform's bodies, and the strokes of the real robot's legs (none where it does not close)."""
+    """One mode: its number as in the text, its state, its caption, the marked point (3,), the outlines of
+    the platform links, and the strokes of the real robot's legs (none where it does not close)."""
 
     label: str
     state: str
@@ -54,7 +54,7 @@ class Placed:
 
 @dataclass(frozen=True, eq=False)
 class ModesScene:
-    """What is drawn. ``normal`` (3,) is that of the plane in which everything moves, None in space; ``ground``
+    """Drawn scene. ``normal`` (3,) is that of the plane in which everything moves, None in space; ``ground``
     (n, 3) are the centres of the base's joints; ``rest`` the legs whose curves are not drawn, though they count."""
 
     normal: Array | None
@@ -64,7 +64,7 @@ class ModesScene:
     rest: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """What the picture says, in a few numbers: each mode's marked point, each trace's middle and spread (m)."""
+        """Return the scene in a few numbers: each mode's marked point, each trace's middle and spread (m)."""
         return {
             "modes": [{"label": each.label, "state": each.state, "at": each.at.tolist()} for each in self.placed],
             "traces": [
@@ -96,7 +96,7 @@ class _Plot:
 
 
 def scene(found: AssemblyModes) -> ModesScene:
-    """What a picture of the modes shows; they must not be a continuum."""
+    """Return the scene of the modes, which must not be a continuous family."""
     confined = found.confined
     plot = _platform(found) if confined is None or confined.back else _PLOTS[confined.motion](found, confined)
     listed = [(str(k), mode) for k, mode in enumerate(found.modes, 1)]
@@ -118,13 +118,13 @@ def _place(found: AssemblyModes, plot: _Plot, label: str, mode: AssemblyMode) ->
     state = NEAR if label.startswith(NEAR) else GOAL if mode.goal else _STATES[mode.reachable]
     said = "not found" if mode.reachable is None else "not assembled"
     if mode.goal:
-        words = "the pose itself"
+        words = "given pose"
     elif mode.left_open:
         words = f"{said}: " + ", ".join(
             f"{noun}{'s' * (len(names) > 1)} {', '.join(names)}" for noun, names in mode.left_open
         )
     else:
-        words = f"{said}: beyond limits" if mode.beyond_limits else "assembled"
+        words = f"{said}: beyond joint limits" if mode.beyond_limits else "assembled"
     return Placed(label, state, words, plot.mark(mode), bodies, strokes)
 
 
@@ -153,7 +153,7 @@ def _platform(found: AssemblyModes) -> _Plot:
 
 
 def _translating(found: AssemblyModes, confined: TipLoci) -> _Plot:
-    """What the platform's position can be by each leg alone: they meet in the modes (MMT Fig. 5)."""
+    """Return the loci of the platform's position on each leg alone: they intersect at the modes (MMT Fig. 5)."""
     plot = _platform(found)
     X = found.goal.pose(plot.body)
     p = transform(X, plot.place)
@@ -231,12 +231,12 @@ _PLOTS: dict[str, Callable[[AssemblyModes, TipLoci], _Plot]] = {
 
 
 def _on(tip: Tip, legs: Sequence[Tip]) -> str:
-    """What a trace is called: where the tip of a leg can be while the platform is held by these legs alone."""
+    """Name a trace: the locus of the attachment point of a leg while the platform is held by these legs alone."""
     return f"B{tip.leg.translate(LOWERED)} on leg{'s' if len(legs) > 1 else ''} {', '.join(each.leg for each in legs)}"
 
 
 def _deciding(found: AssemblyModes, confined: TipLoci, count: int) -> tuple[int, ...]:
-    """The places of this many legs on curves for which the modes were solved, tips at rest first, and last the moving
+    """The places of this many legs on curves for which the modes were solved, fixed tips first, and last the moving
     tip whose places at the modes are farthest apart. Empty where there are none or legs have several branches."""
     if any(tip.others for tip in confined.tips):
         return ()

@@ -1,4 +1,4 @@
-"""Answers as they are shown: text, JSON, HTML for notebooks, pictures."""
+"""Results as text, JSON, HTML for notebooks and figures."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ if TYPE_CHECKING:
     from ..mechanism.pose import Pose
 
 PICTURES = (*FIGURES, ".gif")
-"""Endings of pictures."""
+"""Suffixes of figures."""
 
 
 @dataclass(frozen=True, repr=False)
 class Picture:
-    """A picture, as a notebook shows it where it is ``png`` or ``svg``."""
+    """Figure of a result, shown by a notebook if it is ``png`` or ``svg``."""
 
     content: bytes
     words: str
     kind: str
     draws: Callable[[str], bytes]
-    """Draws it in a file with another of the ``endings``."""
+    """Function that draws it with another of the suffixes ``endings``."""
     endings: tuple[str, ...]
 
     def __repr__(self) -> str:
@@ -49,8 +49,13 @@ class Picture:
         return self.content.decode() if self.kind == "svg" else None
 
     def save(self, file: str | Path) -> None:
-        """Write it, whole or not at all, drawn again for the ending of another kind; raises ``BadRequest`` for an
-        ending that is none of its kinds."""
+        """Write the figure, completely or not at all, drawn again for another suffix.
+
+        Raises
+        ------
+        BadRequest
+            If the suffix is none of ``endings``.
+        """
         from ..description.files import write_whole
 
         ending = _ending(file, self.endings)
@@ -58,8 +63,20 @@ class Picture:
 
 
 def text(result: Result) -> str:
-    """The text that the command line prints of a result.
+    """Return the text that the command line prints of a result.
 
+    Parameters
+    ----------
+    result
+        Result of an analysis.
+
+    Returns
+    -------
+    str
+        Text of several lines.
+
+    Examples
+    --------
     >>> print(hrsynth.text(hrsynth.legs("rrrrr_m1")).splitlines()[0])
     rrrrr_m1   R*RRRR*   2 dof
     """
@@ -68,8 +85,8 @@ def text(result: Result) -> str:
 
 
 def record(command: str, robot: Mechanism | None, fields: dict[str, Any]) -> str:
-    """The JSON text of a command's answer: one object, always with ``command`` and ``version``, with the name of the
-    ``robot`` and its platform where it is about one (no NaN, no infinity)."""
+    """Return the JSON text of a command: one object with ``command`` and ``version``, and the name and platform of the
+    ``robot`` if it concerns one (no NaN, no infinity)."""
     head: dict[str, Any] = {}
     if robot is not None:
         chosen = None if robot.choice is None else {"chosen": robot.choice.chosen, "reason": robot.choice.reason}
@@ -87,9 +104,20 @@ def record(command: str, robot: Mechanism | None, fields: dict[str, Any]) -> str
 
 
 def html(result: Result) -> str:
-    """What a notebook shows: a view that moves; otherwise the same text in columns, without line breaks, motors
-    underlined by markup, which works in any font.
+    """Return the HTML that a notebook shows: a moving view, otherwise the text in columns, motors underlined by markup.
 
+    Parameters
+    ----------
+    result
+        Result of an analysis.
+
+    Returns
+    -------
+    str
+        HTML fragment.
+
+    Examples
+    --------
     >>> hrsynth.html(hrsynth.derive("3rrr_m1"))[:4]
     '<pre'
     """
@@ -113,29 +141,50 @@ def draw(
     width: str | None = None,
     font: str | None = None,
 ) -> Picture:
-    """A picture of a result, written to ``file`` (.png, .pdf or .svg; for a servo run also .gif) if one is given: the
-    kinematic schemes of a derivation's robots (.svg) and, as with ``-o``, assembly modes, an atlas, a servo run,
-    checked or accuracy poses over a grid, and where a freedom is lost over a ``plane`` of poses (``steps`` a side).
-    ``width`` (``"88mm"``) and ``font`` (``"serif 8pt"``) are as on the command line.
+    """Draw a result: schemes of a derivation, modes, aspects, a servo run, poses over a grid, or the Type 2 locus.
 
-    >>> picture = hrsynth.draw(hrsynth.modes("3rrr_m1"), width="88mm")
-    >>> picture
-    <Picture: 3rrr_m1, watching 1, 2, 3: 2 real of 6 complex (hidden robot) at x=0.01,y=-0.015,z=0,phi=0deg>
+    Parameters
+    ----------
+    result
+        Result of an analysis.
+    file
+        File to write: .png, .pdf or .svg; of a servo run also .gif; of a derivation .svg.
+    plane
+        Plane of poses of the Type 2 locus, of the result of ``singularities``.
+    steps
+        Poses per side of the plane, 5 to 300.
+    width
+        Width of the figure (``"88mm"``).
+    font
+        Font and size of its text (``"serif 8pt"``).
 
-    Raises ``BadRequest`` for a result that has no picture.
+    Returns
+    -------
+    Picture
+        Figure, shown by a notebook.
+
+    Raises
+    ------
+    BadRequest
+        If the result has no figure.
+
+    Examples
+    --------
+    >>> hrsynth.draw(hrsynth.modes("3rrr_m1"), width="88mm").kind
+    'png'
     """
     require_range("steps", steps, "an integer", 5, 300)
     asked = {"plane": plane, "steps": steps, "seed": 0, "width": width, "font": font}
     if not isinstance(result, Result):
-        raise BadRequest("a picture of", repr(result), "what a function of hrsynth answers")
+        raise BadRequest("draw: not a result", repr(result), remedy="Give the result of a function of hrsynth.")
     for drawn in outputs_of(result.shown_as).files:
         endings = tuple(each for each in PICTURES if each in drawn.makers)
         if not endings or (drawn.part is not None and getattr(result, drawn.part) is None):
             continue
         if plane is not None and "plane" not in drawn.takes:
-            raise BadRequest("a plane is drawn", type(result).__name__, "only of the result of singular")
+            raise BadRequest("plane: not for this result", type(result).__name__, "result of singularities")
         if not drawn.drawn and (width is not None or font is not None):
-            raise BadRequest("width and font are of a figure", type(result).__name__, "what is drawn with axes")
+            raise BadRequest("width, font: not for this result", type(result).__name__, remedy="Omit them.")
         draws = partial(_content, drawn, result, asked)
         ending = endings[0] if file is None else _ending(file, endings)
         picture = Picture(draws(ending), result.headline(), ending[1:], draws, endings)
@@ -143,7 +192,7 @@ def draw(
             picture.save(file)
         return picture
     raise BadRequest(
-        "there is no picture of",
+        "draw: no figure of this result",
         repr(result),
         [
             f"{name} with {each.words}" if each.words else name
@@ -155,12 +204,12 @@ def draw(
 
 
 def _ending(file: str | Path, endings: tuple[str, ...]) -> str:
-    """The ending of a file that a picture can be written to; raises ``BadRequest``."""
+    """Return the suffix of a file for a figure; raise ``BadRequest`` if it is unknown."""
     from ..description.files import as_path, require_writable
 
     ending = as_path(file).suffix.lower()
     if ending not in endings:
-        raise BadRequest("cannot write the picture: unknown extension", str(file), endings)
+        raise BadRequest("cannot write the figure: unknown extension", str(file), endings)
     require_writable(file)
     return ending
 

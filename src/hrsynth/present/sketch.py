@@ -16,14 +16,14 @@ from ..tolerances import SAME_DIRECTION
 
 
 def axis_label(name: str) -> str:
-    """What stands at the axis of a part of a pose."""
+    """Return the label of the axis of a pose coordinate."""
     return "φ (degrees)" if name == "phi" else f"{name} (m)"
 
 
 MARGIN = 0.06
 """Space about what is drawn, over its extent."""
 APART = 0.15
-"""Distance on the page, over the extent of what is drawn, beyond which two points are well told apart."""
+"""Distance on the page, over the extent of what is drawn, beyond which two points are clearly distinct."""
 OPEN = 0.35
 """Part of its width that a curve may keep on the page to be seen well."""
 WIRES = 12
@@ -41,7 +41,7 @@ Box = tuple[float, float, float, float]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Sketch(Value):
-    """How points (3,) of the base frame are drawn: along ``axes`` (k, 3), k = 2 in a plane and 3 in space, seen from
+    """Projection of points (3,) of the base frame: along ``axes`` (k, 3), k = 2 in a plane and 3 in space, seen from
     ``view`` (elevation and azimuth in degrees)."""
 
     axes: Array
@@ -63,7 +63,7 @@ class Sketch(Value):
 
     @property
     def flat(self) -> bool:
-        """Whether everything is in a plane."""
+        """Return True if everything is in a plane."""
         return len(self.axes) == 2
 
     def place(self, figure: Any, box: Box, extent: Array, bare: bool = False) -> Any:
@@ -112,7 +112,7 @@ class Sketch(Value):
         place.set_position((whole.x0 + x, whole.y0 + y, whole.width, whole.height))
 
     def _inches(self, place: Any, points: Array) -> Array:
-        """Where points (n, 3) are on the page, (n, 2)."""
+        """Project points (n, 3) to the page, (n, 2)."""
         place.apply_aspect()
         return self._on_page(place, points)[:, :2] / 72.0
 
@@ -239,7 +239,7 @@ def _view(spots: Array, curves: Sequence[Array]) -> tuple[float, float]:
 
 
 def seen_along(view: tuple[float, float]) -> Array:
-    """Right, up and towards the eye (3, 3) by rows, seen from elevation and azimuth (degrees)."""
+    """Return right, up and towards the viewer (3, 3) by rows, seen from elevation and azimuth (degrees)."""
     up, turn = np.radians(view)
     eye = np.array([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)])
     right = np.array([-np.sin(turn), np.cos(turn), 0.0])
@@ -247,8 +247,8 @@ def seen_along(view: tuple[float, float]) -> Array:
 
 
 def _spread(v: Array) -> tuple[int, float]:
-    """Which singular value of a curve about its middle tells how open it is, the first of a line's and the second of
-    others, and how large it is in space."""
+    """Return the index of the singular value of a curve about its middle that measures its opening, the first of a line
+    and the second of others, and its value in space."""
     values = np.linalg.svd(v, compute_uv=False)
     k = int(values[1] > 1e-6 * values[0])
     return k, float(values[k])

@@ -53,7 +53,7 @@ def opened(tab: Tab, address: str, name: str, size: str = "wide") -> Any:
 
 def answered(page: Any) -> None:
     """Wait until nothing is under way."""
-    page.locator("#answer", has_text=re.compile(r"^(?!.*Working out)")).wait_for(timeout=SLOW)
+    page.locator("#answer", has_text=re.compile(r"^(?!.*Computing which legs)")).wait_for(timeout=SLOW)
     until(page, IDLE)
 
 
@@ -138,7 +138,7 @@ def test_the_error_that_is_shown_is_that_of_the_legs_that_are_watched(tab: Tab, 
         told = panel.locator(".verdict").inner_text()
         assert page.locator("#now").inner_text() in told
         assert page.evaluate("studio.state.error.step") == page.evaluate("studio.panels.legs.found.error.step")
-    assert "no bound" in page.locator("#now").inner_text()
+    assert "unbounded" in page.locator("#now").inner_text()
 
 
 @pytest.mark.parametrize("name", ["rrrrr_m1", "quattro"])
@@ -225,7 +225,7 @@ def test_at_a_singular_pose_nothing_says_that_all_is_well(tab: Tab, address: str
     there = min(poses, key=lambda pose: (pose["x"] - x) ** 2 + (pose["y"] - y) ** 2)
     page.evaluate("(values) => studio.move({ values })", [there["x"], there["y"]])
     panel.locator(".verdict.elsewhere").wait_for(timeout=SLOW)
-    assert "Here 1 of 2" in panel.locator(".verdict .wrong").inner_text()
+    assert "At this pose 1 of 2" in panel.locator(".verdict .wrong").inner_text()
     assert panel.locator(".verdict.good").count() == 0
 
 
@@ -250,7 +250,7 @@ def test_sliders_move_the_robot_and_home_brings_it_back(tab: Tab, address: str):
         answered(page)
         values = page.evaluate("() => studio.values")
         assert values[index] > home[index]
-    panel.get_by_role("button", name="Home").click()
+    panel.get_by_role("button", name="Zero configuration").click()
     answered(page)
     assert page.evaluate("() => studio.values") == pytest.approx(home, abs=1e-6)
 
@@ -274,12 +274,12 @@ def test_a_mode_is_flown_to_and_back(tab: Tab, address: str):
     panel.locator(".modes button:enabled").last.click()
     until(page, f"() => studio.values.some((value, i) => Math.abs(value - {before}[i]) > 1e-3)")
     answered(page)
-    panel.get_by_role("button", name="Which of them lie in one aspect?").click()
+    panel.get_by_role("button", name="Group by aspect").click()
     answered(page)
     assert panel.locator(".modes button").all_inner_texts() == ["mode 1, aspect 1", "mode 2, aspect 2"]
     assert panel.locator(".modes [aria-current=true] button").inner_text() == "mode 2, aspect 2"
-    assert "separated (certified)" in panel.inner_text()
-    panel.get_by_role("button", name="Back to where I was").click()
+    assert "separated (proved)" in panel.inner_text()
+    panel.get_by_role("button", name="Back to the previous pose").click()
     answered(page)
     assert page.evaluate("() => studio.values") == pytest.approx(before, abs=1e-6)
 
@@ -481,7 +481,7 @@ def test_a_slow_ask_says_so_and_is_cancelled_and_a_newer_one_replaces_it(tab: Ta
     page = opened(tab, address, "3rrr_m1")
     panel = show(page, "modes")
     panel.get_by_text("Listing the modes").wait_for()
-    panel.get_by_role("button", name="Find them").click()
+    panel.get_by_role("button", name="Find modes").click()
     panel.get_by_role("button", name="Cancel").click()
     assert [re.search('"ask":"(.*?)"', message)[1] for message in held] == ["modes", "cancel"]
     show(page, "legs").get_by_role("checkbox").first.uncheck()

@@ -1,4 +1,4 @@
-"""What is drawn of a mechanism: boxes (joints, planar parallelograms) between links, and the paths that they form.
+"""Boxes of a drawn mechanism (joints, planar parallelograms) between links, and the paths that they form.
 
 A group of boxes is cut into *ears*: a path between two links that are there already, then another, until every box
 is in one. The first ear of a leg is its shortest chain from the base to the platform; the next ones stand beside it.

@@ -1,4 +1,4 @@
-"""Where everything stands in a drawing: legs as parallel rows from the base on the left to the platform on the right.
+"""Layout of a drawing: legs as parallel rows from the base on the left to the platform on the right.
 
 Links have columns, ears have lanes: a box stands in its ear's lane between the columns of its two links, a link is
 the line between its boxes, with a bar across the lanes where it has more than two. What is in no leg and not in the
@@ -254,7 +254,7 @@ def _reach(ways: list[_Way]) -> tuple[int, int]:
 
 
 def _apart(bars: dict[str, tuple[int, int]], columns: dict[str, int]) -> dict[str, float]:
-    """Where bars stand: in their columns, those that share lanes beside each other."""
+    """Place the bars: in their columns, those that share lanes beside each other."""
     places: dict[str, float] = {}
     for column in sorted({columns[link] for link in bars}):
         tracks: list[list[tuple[int, int]]] = []

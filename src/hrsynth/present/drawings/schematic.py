@@ -119,8 +119,8 @@ def leg_svg(
 
 
 def derivation_svg(found: Derivation) -> bytes:
-    """The schemes of both robots side by side, the architecture over each; the real one alone where every leg is
-    blind."""
+    """The schemes of both robots side by side, the architecture over each; the real one alone if every
+    direction is constant."""
     watched = [o.link for o in found.setup.observed]
     schemes = [(f"real robot  {found.architecture}", robot_svg(found.setup.decomposition, observed=watched))]
     if found.hidden is not None:
@@ -149,13 +149,13 @@ def _scheme(drawn: Layout, name: str) -> str:
         *_bands(drawn, scale),
         *_ends(drawn, scale),
         _links(drawn, scale),
-        svg.element("path", d=heads, fill=svg.WATCHED) if heads else "",
+        svg.element("path", d=heads, fill=svg.OBSERVED) if heads else "",
         svg.element("g", *(_symbol(spot, scale) for spot in drawn.spots), stroke=svg.INK, stroke_width=1.6),
     )
 
 
 def _describe(drawn: Layout) -> str:
-    """The drawing in words: each group's boxes in order, what is driven, what is observed."""
+    """The drawing in words: each group's boxes in order, the motors, the observed links."""
     sentences = []
     for number, row in enumerate(drawn.rows):
         own = sorted((spot for spot in drawn.spots if spot.row == number), key=lambda spot: (spot.lane, spot.x))
@@ -190,7 +190,7 @@ def _links(drawn: Layout, scale: Scale) -> str:
     plain = [_net(net, scale) for net in drawn.nets if net.link not in drawn.observed]
     seen = [_net(net, scale) for net in drawn.nets if net.link in drawn.observed]
     return svg.element("g", *plain, fill="none", stroke=svg.INK, stroke_width=2, stroke_linejoin="round") + svg.element(
-        "g", *seen, fill="none", stroke=svg.WATCHED, stroke_width=4, class_="observed"
+        "g", *seen, fill="none", stroke=svg.OBSERVED, stroke_width=4, class_="observed"
     )
 
 
@@ -248,7 +248,7 @@ def _ends(drawn: Layout, scale: Scale) -> list[str]:
             continue
         (x, upper), (_, lower) = (scale.at(net.bar[0], lane) for lane in net.bar[1:])
         upper, lower = upper - 16, lower + 16
-        colour = svg.WATCHED if net.link in drawn.observed else svg.INK
+        colour = svg.OBSERVED if net.link in drawn.observed else svg.INK
         found.append(svg.element("path", d=svg.lines([[(x, upper), (x, lower)]]), stroke=colour, stroke_width=5))
         if net.link == base:
             strokes = [[(x, y), (x - 6, y + 6)] for y in range(int(upper), int(lower), 7)]

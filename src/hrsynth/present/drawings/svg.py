@@ -1,4 +1,4 @@
-"""SVG as text: elements with few decimals, names kept safe, a title and a description for those who do not see it."""
+"""SVG as text: elements with few decimals, names kept safe, a title and a description for screen readers."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from ...characters import name_steering
 from ..palette import PAGE, colour, tint
 
 INK, EMPTY = PAGE["ink"], PAGE["face"]
-MOTOR, VIRTUAL, WATCHED = colour("motor"), colour("actuator"), colour("watched")
-"""What a real motor drives (MMT Table 1), virtual actuators, observed segments."""
+MOTOR, VIRTUAL, OBSERVED = colour("motor"), colour("actuator"), colour("observed")
+"""Colours of motors (MMT Table 1), virtual actuators, observed segments."""
 STROKES = {"joint": INK, "motor": MOTOR, "virtual": VIRTUAL}
 FILLS = {"joint": EMPTY, "motor": tint(MOTOR), "virtual": tint(VIRTUAL)}
 """Line and inside of the symbol of a joint, by its kind."""
@@ -43,7 +43,7 @@ def element(name: str, *content: str, **values: object) -> str:
 
 
 def title(text: str) -> str:
-    """What is read out, and shown under the pointer."""
+    """Return the title, which is read out and shown under the pointer."""
     return element("title", escape(text))
 
 

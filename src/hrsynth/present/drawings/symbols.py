@@ -17,8 +17,8 @@ SHAPES: dict[str, str] = {
     "Π": '<path d="M-13 9L-7 -9H13L7 9Z"/>'
     + "".join(f'<circle cx="{x}" cy="{y}" r="3"/>' for x, y in ((-13, 9), (-7, -9), (13, -9), (7, 9))),
 }
-"""R a hinge seen along its axis, P a sleeve on a rod, U a cross, S a ball in a cup, C a sleeve that also turns, E a
-block between planes, Π a parallelogram with its four hinges."""
+"""R a circle (seen along its axis), P a sleeve on a rod, U a cross, S a ball in a cup, C a sleeve that also turns, E a
+block between planes, Π a parallelogram with its four joints."""
 WORDS = {
     "R": "revolute joint",
     "P": "prismatic joint",
@@ -27,7 +27,7 @@ WORDS = {
     "C": "cylindrical joint",
     "E": "planar joint",
     "F": "fixed joint",
-    "6": "no joint (six freedoms)",
+    "6": "no joint (six dof)",
     "Π": "planar parallelogram",
 }
 

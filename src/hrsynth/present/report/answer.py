@@ -1,4 +1,4 @@
-"""The plain answer of a report: what is seen, where that is lost, how many poses look alike, how far off one may be."""
+"""Summary of a report: observed dof, singularities, poses that look the same, errors."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .parts import Parts, Refused
 
 
 def answer(found: Derivation, told: Parts) -> Iterator[str]:
-    """A sentence for each question that has an answer."""
+    """Yield a sentence for each part of the report that has a result."""
     yield describe_seen(found.verdict, found.setup.labels, found.setup)
     if not isinstance(told.legs, Refused):
         best = max(each.rank for each in told.legs.sets)
@@ -27,13 +27,13 @@ def answer(found: Derivation, told: Parts) -> Iterator[str]:
 
 
 def good(found: Verdict) -> bool:
-    """Whether all is seen that can be: of a formation all but its trivial motions."""
+    """Return True if all dof are observed; of a formation all but its trivial motions."""
     return not found.unobserved and (found.rank == found.dof if found.formation is None else not found.formation.flexes)
 
 
 def set_rows(found: Legs, most: int) -> Iterator[tuple[tuple[str, ...], Verdict, str, bool]]:
-    """The sets of the table, ``most`` at most, those of one size that show all alike in one row; each with its verdict,
-    what is known exactly, and whether it is among the smallest."""
+    """Yield the rows of the table, ``most`` at most: sets (equal ones of full rank share a row), verdict, exact
+    verdict, whether they are smallest."""
     alike: dict[object, tuple[list[str], Verdict, str, bool]] = {}
     for each, exact in zip(found.sets[:most], found.exact, strict=False):
         cell, smallest = exact_cell(exact, each.rank), each.legs in found.minimal

@@ -1,5 +1,5 @@
-"""The drawings of a derivation: legs of the real robot beside those of the hidden one (MMT Table 1), and what each
-accepted step found and left. What is equal but for names is drawn once."""
+"""Drawings of a derivation: legs of the real and of the hidden robot (MMT Table 1), and the robot before and after each
+accepted step. Drawings that are equal but for names are shown once."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ _NAMES = re.compile(
     r'| (?:data-joint|data-link|aria-label)="[^"]*"',
     re.DOTALL,
 )
-"""What tells drawings of equal legs apart."""
+"""Differences between drawings of equal legs."""
 
 
 @dataclass(frozen=True)
 class LegPair:
-    """Legs with the same word in both robots: their labels, words and drawings (of the first); the hidden ones None
-    where the hidden robot has no such leg."""
+    """Legs with the same architecture in both robots: labels, architectures and drawings of the first; None for the
+    hidden ones if the hidden robot has no such leg."""
 
     labels: tuple[str, ...]
     watched: bool
@@ -36,13 +36,13 @@ class LegPair:
 
 
 def actuators(found: Derivation) -> set[str]:
-    """The virtual actuators of the hidden robot: all that drives it."""
+    """Return the virtual actuators of the hidden robot."""
     joints = found.hidden.joints.values() if found.hidden is not None else ()
     return {joint.name for joint in joints if joint.actuated}
 
 
 def pairs(found: Derivation) -> list[LegPair]:
-    """The legs in order, each kind once."""
+    """Return the legs in order, each kind once."""
     real, seen = found.setup.decomposition, {o.link for o in found.setup.observed}
     states = [step.state for step in found.steps if step.state is not None]
     hidden = states[-1].decomposition() if states and found.hidden is not None else None
@@ -72,20 +72,20 @@ def pairs(found: Derivation) -> list[LegPair]:
 
 @dataclass(frozen=True)
 class StepFigure:
-    """An accepted step with its drawings; ``steps`` are the numbers, from 1, of all steps that it stands for."""
+    """Accepted step with its drawings; ``steps`` are the numbers, from 1, of all steps that it represents."""
 
     rule: str
     source: str
     steps: tuple[int, ...]
     legs: tuple[str, ...]
-    """Empty where the step is about the whole robot."""
+    """Empty if the step changes the whole robot."""
     reasons: tuple[str, ...]
     largest_angle: float | None
     before: str
     after: str
 
     def alike(self, other: StepFigure) -> bool:
-        """Whether two steps of different legs look the same but for names."""
+        """Return True if two steps of different legs look the same but for names."""
         drawings = ((self.before, other.before), (self.after, other.after))
         return (
             self.rule == other.rule
@@ -94,7 +94,7 @@ class StepFigure:
         )
 
     def together(self, other: StepFigure) -> StepFigure:
-        """This figure, which stands for another one too."""
+        """Return this figure, which represents another one too."""
         angles = [angle for angle in (self.largest_angle, other.largest_angle) if angle is not None]
         return replace(
             self,
@@ -106,7 +106,7 @@ class StepFigure:
 
 
 def step_figures(found: Derivation) -> list[StepFigure]:
-    """The accepted steps that changed the robot, in order."""
+    """Return the accepted steps that changed the robot, in order."""
     drawn: list[StepFigure] = []
     seen, decomposition = {o.link for o in found.setup.observed}, found.setup.decomposition
     virtual: set[str] = set()

@@ -1,4 +1,4 @@
-"""Formulas and names as a browser sets them: MathML, indices, underlined motors."""
+"""Formulas and names for a browser: MathML, indices, underlined motors."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def _printer() -> Any:
 
 
 def formula(expression: Any, said: str, zero: bool = True) -> str:
-    """An expression (SymPy) as MathML, set equal to zero if asked; ``said`` is read where no MathML is."""
+    """Format an expression (SymPy) as MathML; ``said`` is read where MathML is not supported."""
     found = _printer().doprint(expression).replace("&InvisibleTimes;", "\u2062")
     equals = "<mo>=</mo><mn>0</mn>" if zero else ""
     label = escape(said, {'"': "&quot;"})
@@ -70,13 +70,13 @@ def formula(expression: Any, said: str, zero: bool = True) -> str:
 
 
 def lower_indices(text: str) -> str:
-    """Words with the indices of points and directions set low, as HTML."""
+    """Format words with the indices of points and directions as subscripts, as HTML."""
     found = _INDEXED.sub(lambda m: f"{'τ' if m[1] == 'tau' else m[1]}<sub>{m[2]}</sub>", escape(text))
     return found.replace(_LOW, "<sub>i</sub>").replace("]x", "]<sub>×</sub>").replace("^T", "<sup>T</sup>")
 
 
 def collect_symbols(where: Mapping[str, str]) -> list[tuple[str, str]]:
-    """What symbols mean, those that differ in their index alone as one: ``Bi``, with i = 1, 2, 3."""
+    """Collect the meanings of symbols; those that differ only in their index are one: ``Bi``, with i = 1, 2, 3."""
     kinds: dict[tuple[str, str], list[str]] = {}
     for symbol, meaning in where.items():
         match = _NUMBERED.fullmatch(symbol)
@@ -92,7 +92,7 @@ def collect_symbols(where: Mapping[str, str]) -> list[tuple[str, str]]:
 
 
 def _indices(meaning: str, number: str, symbols: Collection[str]) -> str:
-    """A meaning with the index instead of its number: a letter where it stands alone or in a formula, else low."""
+    """Replace the number in a meaning by the index: a letter if it stands alone or in a formula, else a subscript."""
     formula = set(re.findall(r"[^\W\d_]\w*", meaning)) <= {*symbols, *_FORMULA}
     return re.sub(
         rf"(?<!\d){number}(?!\d)", lambda m: "i" if formula or meaning[m.start() - 1] in " _" else _LOW, meaning
@@ -100,5 +100,5 @@ def _indices(meaning: str, number: str, symbols: Collection[str]) -> str:
 
 
 def underline_motors(text: str) -> str:
-    """An architecture with its driven joints underlined, as HTML."""
+    """Format an architecture with its actuated joints underlined, as HTML."""
     return _BARRED.sub(r"<u>\1</u>", escape(text))

@@ -1,4 +1,4 @@
-"""The page: everything that is shown, set by a template, which also has the words."""
+"""Page of a report: data for the template, which has the words."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ from .formulas import collect_symbols, formula, lower_indices, underline_motors
 from .parts import Parts, Refused, ask
 
 LARGEST_LIST = 63
-"""Sets of legs in the table at most: all of six legs; of more, the smallest sets."""
+"""Largest number of leg sets in the table: all of six legs."""
 PORTRAIT = (420.0, 330.0)
-"""Width and height of the robot's picture (pixels)."""
+"""Width and height of the robot's drawing (pixels)."""
 
 
 def robots(found: Derivation) -> dict[str, Any]:
-    """What the page of any robot says of it and of its derivation, by name in the template."""
+    """Return the data of a robot and its derivation, by their names in the template."""
     name, observed = found.robot.name, [o.link for o in found.setup.observed]
     graphs = [robot_svg(found.setup.decomposition, observed=observed, title=f"Scheme of the real robot {name}")]
     if found.hidden is not None:
@@ -48,13 +48,12 @@ def robots(found: Derivation) -> dict[str, Any]:
         "real": str(found.architecture),
         "hidden": found.hidden_architecture and str(found.hidden_architecture),
         "things": things(found.setup),
-        "watched": ["leg " * o.by_segment + label_of(o) for o in found.setup.observed],
+        "observed": ["leg " * o.by_segment + label_of(o) for o in found.setup.observed],
     }
 
 
 def page(found: Derivation, told: Parts) -> bytes:
-    """The page of HTML, without references to anything outside, that says a derivation and the other parts; what is
-    refused is told with its reason."""
+    """Return the HTML page, self-contained, of a derivation and the other parts; a refused part shows its reason."""
     name, modes, errors = found.robot.name, told.modes, told.accuracy
     return name_steering(
         environment()
@@ -83,7 +82,7 @@ def page(found: Derivation, told: Parts) -> bytes:
 
 @cache
 def environment(package: str = "") -> Any:
-    """The templates of the report, after those of a ``package`` that extends them."""
+    """Load the templates of the report, and before them those of a ``package`` that extends them."""
     from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 

@@ -1,6 +1,6 @@
-"""What a report tells beside the derivation: leg sets, singularities, assembly modes, accuracy; or why it cannot.
+"""Parts of a report beside the derivation: leg sets, singularities, assembly modes, accuracy.
 
-Each part is asked by itself, so that one that is refused leaves a sentence and the others as they are.
+Each part is computed separately; one that is refused leaves a sentence with the reason.
 """
 
 from __future__ import annotations
@@ -25,23 +25,23 @@ from ..view.scale import CONE_TEXT
 POINTS = 500
 """Random poses at which the singularity condition is checked."""
 PIXELS, LENGTHS = "0.5px", "1mm"
-"""Errors in images, and of lengths."""
+"""Errors of image points and of lengths."""
 MAP_SIDE, COARSE_MAP_SIDE = 101, 25
-"""Poses a side of the map, where many are evaluated together and where they are found one by one."""
+"""Poses per side of the map, with and without batched evaluation."""
 
 Answer = TypeVar("Answer")
 
 
 @dataclass(frozen=True)
 class Refused:
-    """A part that cannot be given, and why."""
+    """Part that was refused, with the reason."""
 
     reason: str
 
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """The parts of a report, each an answer or the reason why there is none."""
+    """Parts of a report, each a result or the reason for its absence."""
 
     legs: Legs | Refused
     singularity: Singularity | Refused
@@ -50,8 +50,7 @@ class Parts:
 
 
 def parts(found: Derivation, seed: int) -> Parts:
-    """Ask for each part of a derivation's report, of the robot as it was observed for the derivation; ``seed`` is that
-    of the derivation."""
+    """Compute the parts of a report for the observed robot of the derivation, with its ``seed``."""
     setup, name = found.setup, found.robot.name
     return Parts(
         ask(name, lambda: legs(setup, seed=seed)),
@@ -62,7 +61,7 @@ def parts(found: Derivation, seed: int) -> Parts:
 
 
 def ask(robot: str, question: Callable[[], Answer]) -> Answer | Refused:
-    """The answer about a robot, or why it was refused."""
+    """Return the result of a part, or the reason of its refusal."""
     try:
         return question()
     except HrsynthError as error:
@@ -70,12 +69,12 @@ def ask(robot: str, question: Callable[[], Answer]) -> Answer | Refused:
 
 
 def reason(error: HrsynthError, robot: str) -> str:
-    """An error in words, without the robot's name before it and what a command line would add."""
+    """Return the message of an error without the name of the robot and the remedy."""
     return (error.problem if isinstance(error, BadRequest) else str(error)).removeprefix(f"{robot}: ")
 
 
 def error_plane(setup: ObservedRobot, seed: int) -> Accuracy:
-    """The error maxima over a plane of poses through the zero configuration."""
+    """Compute the error maxima over a plane of poses through the zero configuration."""
     units: set[str] = set()
     for each in setup.observed:
         focal = isinstance(each, CameraObservation) and each.camera is not None and each.camera.focal

@@ -1,4 +1,4 @@
-"""The studio's questions and answers, as plain data: no server, no state, each question says all that it needs."""
+"""Analyses of the studio as plain data: no server, no state, each request is complete."""
 
 from __future__ import annotations
 
@@ -20,31 +20,31 @@ Answerer = Callable[[Request], dict[str, Any]]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AnalysisService(Value):
-    """What answers: the ``folder`` that was opened, where a tab's ``uploads`` lie, and the robot of the command line
-    (``given``: its name or path as ``robot``, its ``options``); None where there is none."""
+    """Service of the analyses: the opened ``folder``, the folder of a tab's ``uploads``, and the robot of the command
+    line (``given``: its name or path as ``robot``, its ``options``); None where there is none."""
 
     folder: Path | None = None
     uploads: Path | None = None
     given: Mapping[str, Any] | None = None
 
     def answer(self, asked: Any) -> dict[str, Any]:
-        """The answer to one question, plain data; raises ``BadRequest`` for what is none, and what answering raises."""
+        """Return the answer to one request, plain data; raise ``BadRequest`` and errors of the analysis."""
         if not isinstance(asked, dict):
-            raise BadRequest("a question", asked, "an object with a field `ask`")
+            raise BadRequest("request", asked, "an object with a field `ask`")
         name = asked.get("ask")
         if not isinstance(name, str) or name not in names():
-            raise BadRequest("no such question", name, names())
+            raise BadRequest("ask: no such analysis", name, names())
         return answerer(name)(Request(asked, self.folder, self.uploads, self.given))
 
 
 @cache
 def names() -> tuple[str, ...]:
-    """The questions that there are: the modules of ``asks``."""
+    """List the analyses: the modules of ``asks``."""
     return tuple(sorted(module.name for module in pkgutil.iter_modules(asks.__path__)))
 
 
 @cache
 def answerer(name: str) -> Answerer:
-    """What answers a question."""
+    """Return the function of an analysis."""
     found: Answerer = import_module(f"{asks.__name__}.{name}").answer
     return found

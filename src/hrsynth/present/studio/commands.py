@@ -1,4 +1,4 @@
-"""The command line and the line of Python that give what a panel shows."""
+"""Command line and line of Python that compute what a panel shows."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from ...tolerances import AS_PRINTED
 from .request import Request
 
 NONE = {"command": "", "python": ""}
-"""Of an answer that no command gives."""
+"""Lines of an answer that no command gives."""
 
 
 def lines(request: Request, name: str, *more: str, watching: bool = True, **given: Any) -> dict[str, str]:
-    """The fields ``command`` and ``python`` of an answer: the question ``name`` with what is ``given``, and ``more``
-    words of the command line; ``watching``: with what is watched."""
+    """Return the fields ``command`` and ``python`` of an answer: the command ``name`` with the options ``given``, and
+    ``more`` words of the command line; ``watching``: with the observed legs."""
     words = ["hrsynth", name, request.source.robot]
     python = []
     if watching and request.watched:
@@ -52,14 +52,13 @@ def lines(request: Request, name: str, *more: str, watching: bool = True, **give
 
 
 def at_pose(setup: ObservedRobot, at: ClosedConfiguration) -> str:
-    """The platform's pose as an option says it, to nine digits."""
+    """Format the platform's pose as an option, to nine digits."""
     given = setup.motion.pose(at.pose(setup.motion.link)).given
     return ",".join(f"{name}={'/'.join(map(digits, values))}" for name, values in given.items())
 
 
 def same_at(setup: ObservedRobot, *at: ClosedConfiguration) -> bool:
-    """Whether a command that is told the poses of these configurations is at them: not at those of another mode, or to
-    which no small steps lead from the zero configuration."""
+    """Return True if a command with the poses of these configurations reaches them, not another mode."""
     drawn, motion = setup.all_samples, setup.motion
     for each in at:
         if np.array_equal(each.q, drawn.start.q):
@@ -74,11 +73,11 @@ def same_at(setup: ObservedRobot, *at: ClosedConfiguration) -> bool:
 
 
 def lines_at(request: Request, name: str, setup: ObservedRobot, here: ClosedConfiguration) -> dict[str, str]:
-    """The lines of a question that is asked at a configuration, none where no command is at it."""
+    """Return the lines of an analysis at a configuration, none if no command reaches it."""
     pose = at_pose(setup, here)
     return lines(request, name, at=pose) if same_at(setup, here) else NONE
 
 
 def digits(value: float) -> str:
-    """A number as it is typed: to a tenth of a nanometre, nine digits."""
+    """Format a number as it is typed: to a tenth of a nanometre, nine digits."""
     return f"{round(float(value), 10) + 0.0:.9g}"

@@ -1,4 +1,4 @@
-"""Who may speak to the server: the page that it served itself, and nobody else.
+"""Access to the server: only from the page that it served itself.
 
 Other pages in the same browser can send requests here too, under a name of their own for this machine, or from a
 foreign origin; other users of this machine can connect. So each request must have exactly one Host of a list, begin its
@@ -72,19 +72,19 @@ class Guard:
             await self.app({**scope, "path": f"/{rest}", "raw_path": f"/{rest}".encode()}, receive, sent)
 
     def _own(self, scope: Any, host: bytes) -> bool:
-        """Whether a request comes from the page, or opens it."""
+        """Return True if a request comes from the page, or opens it."""
         if scope["type"] == "http" and scope["method"] in ("GET", "HEAD"):
             return not values(scope, b"origin") or only(scope, b"origin") == b"http://" + host
         return only(scope, b"origin") == b"http://" + host
 
 
 def values(scope: Any, name: bytes) -> list[bytes]:
-    """What a header's occurrences say."""
+    """Return the values of all occurrences of a header."""
     return [value.strip() for key, value in scope["headers"] if key.lower() == name]
 
 
 def only(scope: Any, name: bytes) -> bytes:
-    """The value of a header that is given once, else nothing."""
+    """Return the value of a header that occurs once, else nothing."""
     found = values(scope, name)
     return found[0] if len(found) == 1 else b""
 

@@ -1,4 +1,4 @@
-"""The server's side of the processes that answer: where they come from, and the line of asks before each."""
+"""Server side of the worker processes: their creation, and the queue of requests of each."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from typing import Any
 
 from ...budgets import LARGEST_ANSWER, MOST_WAITING, WORKER_START_SECONDS
 
-DESK = "hrsynth.present.studio.analysis_service:Desk"
-"""What answers."""
+DESK = "hrsynth.present.studio.analysis_service:AnalysisService"
+"""Class that answers."""
 START = (
     "import sys, json; sys.path[:] = json.loads(sys.argv[1]); from {} import main; main(int(sys.argv[2]), sys.argv[3])"
 )
@@ -86,10 +86,10 @@ class ForkServer:
 
 @dataclass
 class WorkerProcess:
-    """One process of a tab, and the asks that wait for it: one is answered at a time, in order.
+    """One process of a tab, and the requests that wait for it: one is answered at a time, in order.
 
-    An ask that takes longer than ``seconds``, is cancelled, or whose process ends costs the process; the next has a new
-    one. Asks carry all that they need, so nothing is lost with it.
+    A request that takes longer than ``seconds`` or is cancelled ends the process; the next one starts a new process.
+    Requests are complete, so nothing is lost with it.
     """
 
     forks: ForkServer
@@ -102,7 +102,7 @@ class WorkerProcess:
     more: asyncio.Event = field(default_factory=asyncio.Event)
 
     def ask(self, number: int, text: bytes) -> bool:
-        """Put an ask into the line; whether there is room."""
+        """Append a request to the queue; return False if it is full."""
         if len(self.waiting) >= MOST_WAITING:
             return False
         self.waiting.append((number, text))
@@ -110,7 +110,7 @@ class WorkerProcess:
         return True
 
     def cancel(self, number: int) -> bool:
-        """Give an ask up; whether it was waiting: one that is being answered is told of when its process has ended."""
+        """Cancel a request; return True if it was waiting. One under way is reported when its process has ended."""
         if self.current is not None and self.current[0] == number:
             self.current[1].cancel()
         kept = [each for each in self.waiting if each[0] != number]
@@ -122,7 +122,7 @@ class WorkerProcess:
         """Answer until cancelled; the process ends with this."""
         try:
             with contextlib.suppress(OSError, EOFError, TimeoutError):
-                await self._started()  # before the first ask comes
+                await self._started()  # before the first request comes
             while True:
                 while not self.waiting:
                     self.more.clear()
@@ -140,7 +140,7 @@ class WorkerProcess:
             self._end()
 
     async def _answered(self, number: int, text: bytes) -> str:
-        """The message that answers an ask."""
+        """Return the message that answers a request."""
         whole = False
         try:
             reader, writer = await self._started()
@@ -151,9 +151,9 @@ class WorkerProcess:
             whole = True
             return answer.decode()
         except TimeoutError:
-            return gone(number, f"that takes longer than {self.seconds:g} seconds and was given up", "TooSlow")
+            return gone(number, f"the analysis took longer than {self.seconds:g} seconds and was cancelled", "TooSlow")
         except (OSError, EOFError):
-            return gone(number, "the process that should answer has ended: it may have run out of memory", "Ended")
+            return gone(number, "the analysis process has ended: it may have run out of memory", "Ended")
         finally:
             if not whole:
                 self._end()
@@ -181,7 +181,7 @@ class WorkerProcess:
 
 
 def frame_message(text: bytes) -> bytes:
-    """A frame, as the other side reads it."""
+    """Return a frame, as the other side reads it."""
     return len(text).to_bytes(HEAD, "big") + text
 
 
@@ -193,11 +193,11 @@ async def _frame(reader: asyncio.StreamReader) -> bytes:
 
 
 def cancel_message(number: int) -> str:
-    """The message of an ask that was cancelled."""
-    return gone(number, "given up", "Cancelled")
+    """Return the message of a cancelled request."""
+    return gone(number, "cancelled", "Cancelled")
 
 
 def gone(number: int | None, error: str, kind: str) -> str:
-    """The message of an ask that has no answer."""
+    """Return the message of a request without an answer."""
     message: dict[str, Any] = {"n": number, "error": error, "kind": kind}
     return json.dumps(message)

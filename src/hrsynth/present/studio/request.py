@@ -1,4 +1,4 @@
-"""What a question of the studio gives, read and checked field by field: the robot, the watched legs, where it is."""
+"""Request of the studio, read and checked field by field: the robot, the observed legs, the configuration."""
 
 from __future__ import annotations
 
@@ -29,19 +29,19 @@ from ..view.states import Mover, Posed
 SHIPPED, FILE, FOLDER, GIVEN = "shipped", "file", "folder", "given"
 LISTS, TEXTS = ("motors", "close", "freeze"), ("base", "platform", "keyframe", "unit")
 OPTIONS = (*TEXTS, *LISTS, "tolerance", "as_written")
-"""What a question may say of a file, as ``hrsynth.load`` takes it."""
+"""Options of a robot file in a request, as in ``hrsynth.load``."""
 
 
 @dataclass(frozen=True)
 class RobotSource:
-    """A robot: what ``hrsynth.load`` takes, the options that are set, and when its file was written."""
+    """Source of a robot: the argument of ``hrsynth.load``, its options, and the time stamp of its file."""
 
     robot: str
     options: tuple[tuple[str, Any], ...]
     written: tuple[int, int] | None = None
 
     def load(self) -> Mechanism:
-        """The mechanism; one that was read is not read again while its file stays as it is."""
+        """Return the mechanism; it is read again only if its file changes."""
         return _load(self)
 
 
@@ -52,8 +52,8 @@ def _load(source: RobotSource) -> Mechanism:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Request(Value):
-    """A question's ``fields``, and where its robots lie (see :class:`.desk.AnalysisService`). Every field is read by
-    one of these methods; all raise ``BadRequest`` in one line."""
+    """Request with its ``fields``, and the folders of its robots (see :class:`.AnalysisService`). Every
+    field is read by one of these methods; all raise ``BadRequest`` in one line."""
 
     fields: Mapping[str, Any]
     folder: Path | None = None
@@ -63,7 +63,7 @@ class Request(Value):
     # Fields of any question
 
     def flag(self, name: str) -> bool:
-        """Yes or no; no where it is not said."""
+        """Return a truth value, False by default."""
         found = self.fields.get(name)
         if found is not None and not isinstance(found, bool):
             raise BadRequest(name, found, "true or false")
@@ -95,7 +95,7 @@ class Request(Value):
 
     @cached_property
     def source(self) -> RobotSource:
-        """The robot that is asked about."""
+        """Return the source of the robot."""
         said = self.fields.get("robot")
         if not isinstance(said, dict):
             raise BadRequest("robot", said, "an object with a field `source`")
@@ -103,11 +103,13 @@ class Request(Value):
         options = _options(said.get("options"))
         if kind == SHIPPED:
             if name not in list_robots():
-                raise BadRequest("no such shipped robot", name, "what the gallery lists")
+                raise BadRequest("no such shipped robot", name, "a name of the gallery")
             return RobotSource(name, options)
         if kind == GIVEN and not name:
             if self.given is None:
-                raise BadRequest("the robot of the command line", None, "none was given")
+                raise BadRequest(
+                    "source given: the command line names no robot", remedy="Choose a robot of the gallery."
+                )
             own = {**dict(_options(self.given.get("options"))), **dict(options)}
             return _of_file(str(self.given["robot"]), tuple(sorted(own.items())))
         if kind == PREFIX.removesuffix(":"):
@@ -126,12 +128,12 @@ class Request(Value):
 
     @cached_property
     def mechanism(self) -> Mechanism:
-        """The robot as it is read."""
+        """Return the robot as read."""
         return self.source.load()
 
     @cached_property
     def watched(self) -> tuple[str, ...] | None:
-        """The names of what is watched; None: the file's own."""
+        """Return the names of the observed legs; None: those of the file."""
         found = self.fields.get("watch")
         return None if found is None else _texts("watch", found)
 
@@ -142,52 +144,52 @@ class Request(Value):
 
     @cached_property
     def setup(self) -> ObservedRobot:
-        """The robot with what is watched of it; with all legs where none is."""
+        """Return the observed robot; with all legs if none is observed."""
         return observe(self.mechanism, self.watched or None, self.camera).by_segments("the studio")
 
     @property
     def blind(self) -> bool:
-        """Whether no leg is watched at all."""
+        """Return True if no leg is observed."""
         return self.watched == ()
 
     def seeing(self) -> ObservedRobot:
-        """The robot with what is watched of it; raises ``BadRequest`` where no leg is."""
+        """Return the observed robot; raise ``BadRequest`` if no leg is observed."""
         if self.blind:
-            raise BadRequest("nothing is observed", "no leg", "leg labels, links, or all")
+            raise BadRequest("watch: no leg is observed", remedy="Observe at least one leg.")
         return self.setup
 
     @cached_property
     def derivation(self) -> Derivation:
-        """The hidden robot of the watched legs."""
+        """Return the derivation of the hidden robot."""
         return derive(self.seeing(), unchecked=False)
 
     def mover(self, hidden: bool = False) -> Mover:
-        """What moves the robot, and with ``hidden`` its hidden robot beside it."""
+        """Return the mover of the robot, and with ``hidden`` of its hidden robot."""
         other = self.derivation.hidden if hidden and not self.blind else None
         return _mover(self.setup, other)
 
     @property
     def ends(self) -> tuple[tuple[Posed, Posed], ...]:
-        """Where each of the platform's coordinates alone comes to, whatever is watched."""
+        """Return the ends of each slider; they do not depend on the observed legs."""
         return _mover(observe(self.mechanism, None, self.camera), None).ends
 
     # Where it is
 
     def here(self, mover: Mover, field: str = "here") -> Posed:
-        """Where the robot is, or is wanted: the zero configuration where nothing is said. What a hidden robot had for
-        other legs does not count; its loops and those of the real robot are closed, else it is refused."""
+        """Return a configuration, by default the zero configuration; a hidden robot of other legs is ignored. Raise
+        ``BadRequest`` if loops are not closed."""
         found = self.fields.get(field)
         if found is None:
             return mover.home
         if not isinstance(found, dict):
-            raise BadRequest(field, found, "what an answer has there, or null")
+            raise BadRequest(field, found, "the field of an answer, or null")
         model = mover.home.real.model
         q = _configuration(model, found.get("q"))
         try:
             at = ClosedConfiguration.of(model, q)
         except LoopsNotClosed as error:
             raise BadRequest(
-                f"{field}: the loops are not closed, residual", f"{error.residual:.2g}", f"up to {error.tolerance:g}"
+                f"{field}: the loops are not closed: residual", f"{error.residual:.2g}", f"at most {error.tolerance:g}"
             ) from None
         other = found.get("hidden")
         if mover.hidden is None:
@@ -196,14 +198,14 @@ class Request(Value):
             q = _configuration(mover.hidden, other.get("q"))
             posed = mover.beside(at, q)
             if posed is None:
-                raise BadRequest(f"{field}: the hidden robot is elsewhere", None, f"with the platform, to {FOLLOWED:g}")
+                raise BadRequest(f"{field}: hidden robot and platform differ by more than {FOLLOWED:g}")
             return posed
         if other is not None and not isinstance(other, dict):
-            raise BadRequest(f"{field}: hidden", other, "what an answer has there, or null")
+            raise BadRequest(f"{field}: hidden", other, "the field of an answer, or null")
         return mover.with_hidden(at)
 
     def describe_here(self, posed: Posed) -> dict[str, Any]:
-        """The field ``here`` of an answer."""
+        """Return the field ``here`` of an answer."""
         hidden = None if posed.hidden is None else {"legs": list(self.setup.labels), "q": posed.hidden.tolist()}
         return {"q": posed.real.q.tolist(), "hidden": hidden}
 
@@ -222,7 +224,7 @@ def inside(root: Path, name: str) -> Path:
             return path
     except (OSError, ValueError, RuntimeError):
         pass
-    raise BadRequest("no such file", name, "a file that was dropped here, or one of the folder")
+    raise BadRequest("no such file", name, "an uploaded file, or one of the folder")
 
 
 def _of_file(robot: str, options: tuple[tuple[str, Any], ...]) -> RobotSource:
@@ -258,7 +260,7 @@ def _options(found: Any) -> tuple[tuple[str, Any], ...]:
             set_[name] = True
     # a file beside the robot's own would be read: FILE.srdf:NAME
     if "/" in set_.get("keyframe", "") or "\\" in set_.get("keyframe", ""):
-        raise BadRequest("keyframe", set_["keyframe"], "the name of a posture")
+        raise BadRequest("keyframe", set_["keyframe"], "the name of a keyframe")
     return tuple(sorted(set_.items()))
 
 
@@ -291,8 +293,8 @@ def _vector(name: str, found: Any, size: int) -> Array:
 
 
 def _configuration(model: PinocchioModel, found: Any) -> Array:
-    """A configuration of a twin: its size, finite, with unit quaternions."""
+    """Read a configuration of a model: of its size, finite, with unit quaternions."""
     q = _vector("here: coordinates", found, len(model.q0))
     if not model.is_normalized(q):
-        raise BadRequest("here: a turn", None, "a unit quaternion")
+        raise BadRequest("here: a rotation is not a unit quaternion")
     return q

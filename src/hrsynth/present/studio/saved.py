@@ -1,4 +1,4 @@
-"""The view as one self-contained page: the page of the studio without its panels and its server, no network."""
+"""View as one self-contained page: the page of the studio without panels, server and network."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ LINKS = {
     "style": re.compile(r'<link rel="stylesheet" href="(.*)">\n'),
     "script": re.compile(r'<script src="(.*)"></script>\n'),
 }
-"""How the page names its files."""
+"""Patterns of the files in the page."""
 THREE = "three.min.js"
 
 
 def static(found: View) -> bytes:
-    """The view as a page that needs no server."""
+    """Return the view as a page that needs no server."""
     return page(found).encode()
 
 
 def inline(found: View) -> str:
-    """The same page in a frame, for a notebook."""
+    """Return the page in a frame, for a notebook."""
     return (
         f'<iframe srcdoc="{escape(page(found))}" title="{escape(name_steering(found.headline()))}" '
         'style="width: 100%; height: 560px; border: 0"></iframe>'
@@ -31,7 +31,7 @@ def inline(found: View) -> str:
 
 
 def page(found: View) -> str:
-    """The page, all its files inside."""
+    """Return the page with all its files."""
     from jinja2.utils import htmlsafe_json_dumps
 
     text = (PAGE / MAIN).read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The server of the page, on this machine alone. It reads no robot: it shows files of its own and passes asks on."""
+"""Server of the page, on this machine only. It reads no robot: it serves its own files and passes requests on."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ TYPES = {
     ".css": "text/css; charset=utf-8",
     ".svg": "image/svg+xml",
 }
-"""What is shown of the page's folder."""
+"""Files of the page's folder that are served."""
 MAIN = "studio.html"
 WRITTEN = {"palette.css": palette.css, "palette.js": palette.js}
-"""Files of the page that are not in its folder."""
+"""Generated files of the page."""
 
 
 @with_spelling
@@ -56,12 +56,37 @@ def studio(
     port: int = 0,
     open_: bool = True,
 ) -> StudioServer:
-    """Serve the studio on this machine, with a robot, a folder of robots or nothing, and open it in the browser:
-    returns a server with ``address`` and ``stop()``, which also ends with this process. Port 0 is any free port.
+    """Serve the studio on this machine and open it in the browser.
 
-    Raises ``BadRequest`` for an unknown robot and a port that is not available, ``BadRobotFile`` for a file
-    that is missing or no robot file, ``MissingExtra``.
+    Parameters
+    ----------
+    robot
+        Robot, folder of robots, or None for the gallery.
+    observe
+        Observed legs, by default those of the file.
+    camera
+        Link that carries the camera, by default the base.
+    port
+        Port of the server; 0 for any free port.
+    open_
+        Open the browser.
 
+    Returns
+    -------
+    StudioServer
+        Server with ``address`` and ``stop()``; it also ends with this process.
+
+    Raises
+    ------
+    BadRequest
+        If the robot is unknown or the port is not available.
+    BadRobotFile
+        If the file is missing or not a robot file.
+    MissingExtra
+        If the extra ``studio`` is not installed.
+
+    Examples
+    --------
     >>> server = hrsynth.studio("3rrr_m1", open_=False)
     >>> server.stop()
     """
@@ -89,15 +114,15 @@ def studio(
 
 
 def view_server(found: View, port: int = 0, open_: bool = True, source: dict[str, Any] | None = None) -> StudioServer:
-    """Serve the page without its panels, of a view; ``source``: the robot and its options as the command line has them.
-    Raises as :func:`studio`."""
+    """Serve the page of a view, without panels; ``source``: the robot and its options on the command line. Raises as
+    :func:`studio`."""
     from ...description.overrides import names
 
     if not all(seen.by_segment for seen in found.setup.observed):
         raise BadRequest(
-            "a view that is served knows directions of segments only",
+            "--sensor: a served view shows directions of segments only",
             ", ".join(found.setup.labels),
-            "a page that needs no server (--static view.html, View.save)",
+            remedy="Write a page with --static view.html or View.save.",
         )
     robot = found.setup.robot
     if source is None or "/" in (source["keyframe"] or ""):  # the page names no files
@@ -124,7 +149,7 @@ def view_server(found: View, port: int = 0, open_: bool = True, source: dict[str
 
 
 def _as_read(robot: Mechanism) -> dict[str, Any] | None:
-    """A robot by its file, or the name of a shipped one, where it is just what that says."""
+    """Return a robot by its file, or by the name of a shipped one, if it equals that."""
     from ...description import list_robots, load
 
     if robot.file is None:

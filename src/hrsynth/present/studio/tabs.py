@@ -1,6 +1,6 @@
-"""The tabs of the page: each has a socket, two processes that answer, and the files that were dropped into it.
+"""Tabs of the page: each has a socket, two worker processes, and its uploaded files.
 
-What moves the robot has a process of its own, so that a drag never waits for a longer question.
+Motion has a process of its own, so that a drag never waits for a longer analysis.
 """
 
 from __future__ import annotations
@@ -23,15 +23,14 @@ if TYPE_CHECKING:
     from ...mechanism import Mechanism
 
 TRY_LATER = 1013
-"""How a socket is closed where too many are open."""
+"""Close code of a socket if too many are open."""
 MOVE, CANCEL = "move", "cancel"
 
 
 @dataclass(frozen=True)
 class Opening:
-    """What a server was opened with: a folder of robots, a robot with its options as ``given`` (what ``Desk`` takes) or
-    as a ``mechanism``, what the page does with it first (``watch``, ``camera``, ``hidden``), and whether there are
-    ``panels`` or only the view."""
+    """Content of a server: a folder of robots, a robot with its options as ``given`` (see ``AnalysisService``) or as a
+    ``mechanism``, the first state of the page (``watch``, ``camera``, ``hidden``), and whether it has ``panels``."""
 
     folder: Path | None = None
     given: dict[str, Any] | None = None
@@ -40,7 +39,7 @@ class Opening:
     panels: bool = True
 
     def write(self, folder: Path) -> Opening:
-        """The same with the mechanism as a file in a folder, for processes that read it."""
+        """Write the mechanism to a file in a folder, for the processes that read it."""
         if self.mechanism is None:
             return self
         from ...description import save
@@ -50,7 +49,7 @@ class Opening:
         return replace(self, mechanism=None, given={"robot": str(file), "options": {"as_written": True}})
 
     def message(self, tab: str) -> str:
-        """What a tab is told first."""
+        """Return the first message to a tab."""
         start = None if self.given is None else {"source": "given", "options": {}}
         return json.dumps(
             {"tab": tab, "start": start, "folder": self.folder is not None, "panels": self.panels, **self.first}
@@ -90,7 +89,7 @@ class BrowserTab:
                 await self.socket.send_text(refused)
 
     def _route(self, text: str | None) -> str | None:
-        """Put an ask where it is answered, or cancel one; what is said where that cannot be."""
+        """Queue a request, or cancel one; return the error message if that fails."""
         try:
             asked = json.loads(text or "", parse_constant=_no_number)
             kind = asked["ask"]
@@ -98,11 +97,15 @@ class BrowserTab:
             if type(number) is not int or not isinstance(kind, str):
                 raise TypeError(number)
         except (ValueError, KeyError, TypeError, RecursionError):
-            return gone(None, "no message: an object with a whole number n and the name of an ask", "Unknown")
+            return gone(
+                None,
+                "invalid message: expected an object with a whole number n and the name ask of an analysis",
+                "Unknown",
+            )
         if kind == CANCEL:
             return cancel_message(number) if self.mover.cancel(number) or self.desk.cancel(number) else None
         there = self.mover if kind == MOVE else self.desk
-        return None if there.ask(number, (text or "").encode()) else gone(number, "too many questions wait", "TooMany")
+        return None if there.ask(number, (text or "").encode()) else gone(number, "too many requests wait", "TooMany")
 
 
 def _no_number(name: str) -> None:

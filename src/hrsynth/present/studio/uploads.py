@@ -29,13 +29,13 @@ class UploadFolder:
     def require(self, name: str, length: str | None) -> None:
         """Raise ``BadRequest`` for a name or a length that is refused, before anything is read."""
         if not NAME.fullmatch(name) or name.endswith((" ", ".")) or len(name.encode()) > LONGEST_FILE_NAME:
-            raise BadRequest("a file's name", name, "letters, digits, spaces and . , ( ) + @ - _, no folder")
+            raise BadRequest("file name", name, "letters, digits, spaces and . , ( ) + @ - _, no folder")
         if length is not None and not (length.isascii() and length.isdecimal()):
-            raise BadRequest("a file's length", length, "a whole number")
+            raise BadRequest("file length", length, "a whole number")
         if length is not None and (len(length) > len(str(LARGEST_UPLOAD)) or int(length) > LARGEST_UPLOAD):
             raise FileTooLarge(name, LARGEST_UPLOAD)
         if len({*os.listdir(self.folder), *self.coming, name} - self._parts()) > MOST_UPLOADS:
-            raise BadRequest("another file", name, f"at most {MOST_UPLOADS} in one tab")
+            raise BadRequest(f"{name}: more than {MOST_UPLOADS} files in one tab", remedy="Open another tab.")
 
     def _parts(self) -> set[str]:
         return {each for each in os.listdir(self.folder) if each.startswith(PART)}

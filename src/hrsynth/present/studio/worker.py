@@ -1,8 +1,8 @@
-"""The processes that answer: one loads all modules and forks where it is asked to; its children answer a tab each.
+"""Worker processes: one loads all modules and forks on request; each of its children serves a tab.
 
-Both sides of a channel write frames: four bytes, the length of what follows. The first frame tells a child what it may
-read; then each frame is an ask as the page sent it, and its answer, in order. A child whose channel is closed at the
-other end is killed with all that it started, whatever it is doing; so are all of them where the first process's own
+Both sides of a channel write frames: four bytes, the length of what follows. The first frame names the folders that a
+child may read; then each frame is a request of the page, and its answer, in order. A child whose channel is closed at
+the other end is killed with all that it started, whatever it is doing; so are all of them where the first process's own
 channel is closed: none outlives the server, however that ends.
 """
 
@@ -29,12 +29,12 @@ from ...errors import HrsynthError
 
 FRAME = struct.Struct("!I")
 READY = b"{}"
-"""What a child says first."""
+"""First message of a child."""
 SMALL = "rrrrr_m1"
-"""A robot that is quickly answered about."""
+"""Robot with short analyses."""
 WARMING, WARMING_PAUSE = ("watch", "open"), 3000
-"""Kinds of questions whose modules are loaded before there is a child: the last before the first, the others after such
-a time (ms) without any."""
+"""Analyses whose modules are loaded before there is a child: the last one at once, the others after this time (ms)
+without a child."""
 
 
 def fork_on_request(control: socket.socket, desk: Callable[..., Any]) -> None:
@@ -53,7 +53,7 @@ def fork_on_request(control: socket.socket, desk: Callable[..., Any]) -> None:
             poll.register(each, select.POLLIN)
         left = {channel.fileno(): pid for pid, channel in children.items()}
         for number in left:
-            poll.register(number, 0)  # told of the other end's closing alone
+            poll.register(number, 0)  # reports only that the other end is closed
         events = {number for number, _ in poll.poll(WARMING_PAUSE if warming else None)}
         if not events:
             _warm(desk, warming.pop())
@@ -78,7 +78,7 @@ def fork_on_request(control: socket.socket, desk: Callable[..., Any]) -> None:
 
 
 def _warm(desk: Callable[..., Any], kind: str) -> None:
-    """Ask a question, so that all modules that answer it are loaded once, here."""
+    """Run an analysis, so that all its modules are loaded once, here."""
     with contextlib.suppress(Exception):
         desk(None, None, None).answer({"n": 0, "ask": kind, "robot": {"source": "shipped:" + SMALL}})
     gc.freeze()
@@ -108,7 +108,7 @@ def _kill(pid: int) -> None:
 
 
 def _child(channel: socket.socket, others: list[socket.socket], desk: Callable[..., Any]) -> None:
-    """What a child does, to its end."""
+    """Serve a channel as a child, then exit."""
     status = 1
     try:
         os.setpgid(0, 0)
@@ -138,7 +138,7 @@ def answer_all(channel: socket.socket, desk: Callable[..., Any]) -> None:
 
 
 def answer_message(desk: Any, asked: dict[str, Any]) -> bytes:
-    """The message to the page: the answer, or what went wrong, as the command line says it."""
+    """Return the message to the page: the answer, or the error as on the command line."""
     reply: dict[str, Any] = {"n": asked["n"]}
     try:
         told = _encode({**reply, "answer": desk.answer(asked)})
@@ -148,7 +148,9 @@ def answer_message(desk: Any, asked: dict[str, Any]) -> bytes:
     except HrsynthError as error:
         reply |= failure("\n".join(error.lines()), type(error).__name__)
     except (MemoryError, RecursionError) as error:
-        reply |= failure(f"that needs more memory than is allowed ({WORKER_BYTES >> 30} GB)", type(error).__name__)
+        reply |= failure(
+            f"the analysis needs more memory than the limit ({WORKER_BYTES >> 30} GB)", type(error).__name__
+        )
     except Exception as error:
         if os.environ.get("HRSYNTH_DEBUG"):
             traceback.print_exc()
@@ -162,7 +164,7 @@ def _encode(message: dict[str, Any]) -> bytes:
 
 
 def failure(error: str, kind: str) -> dict[str, str]:
-    """What a message says of an ask that has no answer."""
+    """Return the fields of a message without an answer."""
     return {"error": error, "kind": kind}
 
 

@@ -1,1 +1,1 @@
-"""Results → plain text for a terminal: one module a question."""
+"""Results → plain text for a terminal: one module a analysis."""

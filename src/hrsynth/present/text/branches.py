@@ -1,4 +1,4 @@
-"""A branch from motors to joints: where it is proved, and where that ends."""
+"""Branch from motors to joints in text: the proved part, and the ends of the proof."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ if TYPE_CHECKING:
     from ...analysis.branch.answer import BranchPart, BranchProof, Toggle
 
 UNITS = "metres and radians"
-"""Of the intervals of motors."""
+"""Units of the motor intervals."""
 
 
 def branch(found: BranchProof) -> str:
-    """The robot, then each part: its box, how much of it is proved, and what ends that."""
+    """Return the robot, then each part: its box, the proved fraction, and the ends of the proof."""
     rows: Rows = [
         robot_row(found.robot),
         ("motors", ", ".join(found.motors)),
         (
             "passive",
-            f"{len(found.passive)} coordinates" + (f", {len(found.fixed)} idle ones held" if found.fixed else ""),
+            f"{len(found.passive)} coordinates" + (f", {len(found.fixed)} internal ones fixed" if found.fixed else ""),
         ),
         ("box", found.box),
         ("units", UNITS),
@@ -29,39 +29,41 @@ def branch(found: BranchProof) -> str:
     for part in found.parts:
         rows += _part(part)
     if not found.parts:
-        rows.append(("branch", "no loops: the motors are all there is"))
+        rows.append(("branch", "no loops: the motors are the only joints"))
     return listing(rows + _back(found))
 
 
 def limits(found: BranchProof) -> Rows:
-    """What is known of the limits of joints without a motor, and of motors that the box takes beyond theirs."""
+    """Return the row of joint limits: those of passive joints, and those of motors that the box exceeds."""
     words = found.limits_in_words()
     if beyond := found.motors_beyond():
-        words.append("of motors, passed by the box: " + ", ".join(beyond))
+        words.append("exceeded by the box, of motors: " + ", ".join(beyond))
     return [("limits", words)] if words else []
 
 
 def _back(found: BranchProof) -> Rows:
-    """The way back, from the platform to the motors."""
+    """Return the rows of the inverse map, from the platform to the motors."""
     if not all(part.cells for part in found.parts):
         return []
     rows: Rows = [("", "")]
     if found.injective_box is None:
-        rows.append(("way back", "undecided: motors for a pose are found, others in the box may give the same pose"))
+        rows.append(
+            ("inverse map", "undecided: motor positions for a pose are found, others in the box may give the same pose")
+        )
     else:
         (low, high), (least, most) = found.injective_box, found.proved
         whole = bool((low == least).all() and (high == most).all())
         rows.append(
             (
-                "way back",
-                f"no two motor settings in {'' if whole else 'a part of '}the proved box give the "
+                "inverse map",
+                f"no two motor positions in {'' if whole else 'a part of '}the proved box give the "
                 "same platform pose on this branch, proved",
             )
         )
         if not whole:
             rows.append(
                 (
-                    "that part",
+                    "injective box",
                     [f"{name} {a:.6g} to {b:.6g}" for name, a, b in zip(found.motors, low, high, strict=True)],
                 )
             )
@@ -80,19 +82,19 @@ def _part(part: BranchPart) -> Rows:
         return [*rows, ("branch", "undecided: no cell about the zero configuration could be proved")]
     weakest = min(cell.smallest_singular_value for cell in part.cells)
     whole = part.volume_fraction == 1.0
-    but = " except for the redundant equations, which are bounded" if part.closed_to else ""
+    but = "; redundant equations only bounded" if part.closed_to else ""
     rows += [
         (
             "branch",
             ("one branch, proved in the whole box" if whole else f"one branch, proved in {part.percent} % of the box")
             + but,
         ),
-        ("cells", f"{len(part.cells)}; smallest singular value of the loops at least {weakest:.3g}"),
+        ("cells", f"{len(part.cells)}; smallest singular value of the loop Jacobian at least {weakest:.3g}"),
     ]
     if not whole:
         rows.append(("proved box", bounds))
     rows += [
-        (f"turn of {name}", "comes back to itself" if same else "does not come back to itself")
+        (f"turn of {name}", "the branch returns to itself" if same else "the branch does not return to itself")
         for name, same in part.turns
     ]
     if part.redundant:
@@ -111,8 +113,8 @@ def _part(part: BranchPart) -> Rows:
 
 
 def ends(part: BranchPart) -> Rows:
-    """Where the proof of a part ends, and why."""
-    return [("ends" if not place else "", _end(part, each)) for place, each in enumerate(part.toggles)]
+    """Return the row of the ends of a part's proof, with reasons."""
+    return [("proof ends" if not place else "", _end(part, each)) for place, each in enumerate(part.toggles)]
 
 
 def _end(part: BranchPart, end: Toggle) -> str:
@@ -120,4 +122,4 @@ def _end(part: BranchPart, end: Toggle) -> str:
     if not end.joints:
         return f"at {at}: {end.reason}"
     loops = f" (loop {', '.join(end.loops)})" if len(end.loops) == 1 else ""
-    return f"at {at}, found: {', '.join(end.joints)} can move while all motors rest{loops}"
+    return f"at {at} (not proved): {', '.join(end.joints)} can move while all motors are fixed{loops}"

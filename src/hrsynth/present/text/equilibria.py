@@ -1,4 +1,4 @@
-"""All endings of a loop in text."""
+"""Equilibria of a servo loop in text."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from ...simulation.equilibria.equilibrium import CompletenessReport, Equilibria, Equilibrium, SignedModes
 
 LISTED_SADDLES = 12
-"""Rests that do not attract which are told one by one."""
+"""Number of equilibria that are not stable up to which each is printed."""
 
 
 def equilibria(found: Equilibria) -> str:
-    """The goal, the rests that attract, some of those that do not, and whether that is all."""
+    """Return the goal, the stable equilibria, some of the others, and what is known of completeness."""
     drawn = [each for each in found.points if each.stability in ("stable", "undecided")]
     others = [each for each in found.points if each.stability not in ("stable", "undecided")]
     boxed = [each for each in found.points if each.proved]
@@ -27,9 +27,9 @@ def equilibria(found: Equilibria) -> str:
         *head(found.setup),
         *camera(found.setup),
         ("goal", str(found.pose)),
-        *([] if found.depth == "exact" else [("depth", f"{found.depth}, as the law assumes it")]),
+        *([] if found.depth == "exact" else [("depth", f"{found.depth}, as the control law assumes it")]),
         *GAP,
-        ("attract", table(_lines(drawn)[0], HEADS).splitlines()),
+        ("stable", table(_lines(drawn)[0], HEADS).splitlines()),
         *GAP,
     ]
     if any(each.beyond_limits for each in drawn):
@@ -37,8 +37,8 @@ def equilibria(found: Equilibria) -> str:
         rows[-1:] = [
             (
                 "",
-                f"within all limits of joints {len(inside)} of these {len(drawn)}"
-                + (": the goal alone" if [each.kind for each in inside] == ["goal"] else ""),
+                f"within all joint limits: {len(inside)} of these {len(drawn)}"
+                + (" (the goal only)" if [each.kind for each in inside] == ["goal"] else ""),
             ),
             *GAP,
         ]
@@ -46,9 +46,9 @@ def equilibria(found: Equilibria) -> str:
         lines, counts = _lines(others)
         left = sum(counts[LISTED_SADDLES:])
         told = table(lines[:LISTED_SADDLES], HEADS).splitlines()
-        rows += [("do not", [*told, *([f"and {left} more (--json lists them)"] if left > 0 else [])]), *GAP]
-    rows += [("enclosed", _describe_enclosed(found, boxed)), *GAP]
-    rows += [("continua", [f"‖e‖ = {each.error:.3g}, {each.stability}{_why(each)}" for each in found.families])]
+        rows += [("other", [*told, *([f"and {left} more (--json lists them)"] if left > 0 else [])]), *GAP]
+    rows += [("enclosures", _describe_enclosed(found, boxed)), *GAP]
+    rows += [("families", [f"‖e‖ = {each.error:.3g}, {each.stability}{_why(each)}" for each in found.families])]
     rows += [
         (
             "all",
@@ -66,19 +66,19 @@ HEADS = ("kind", "‖e‖", "", "pose", "")
 
 
 def _are_met(each: SignedModes) -> bool:
-    """Whether there are poses with these legs reversed."""
+    """Return True if there are poses with these legs reversed."""
     return each.listed is not None or bool(each.boxes)
 
 
 def _others(found: Equilibria, unmet: list[SignedModes]) -> list[str]:
-    """The choices of reversed legs at which no pose was met."""
+    """Describe the combinations of reversed legs without any pose."""
     proved = sum(each.empty for each in unmet)
     if not unmet:
         return []
     what = (
         f"{name_all('leg', unmet[0].reversed)} reversed"
         if len(unmet) == 1
-        else f"{len(unmet)} other choices of reversed legs"
+        else f"{len(unmet)} other combinations of reversed legs"
     )
     if proved < len(unmet):
         return [f"poses with {what}: none found, not proved"]
@@ -86,12 +86,12 @@ def _others(found: Equilibria, unmet: list[SignedModes]) -> list[str]:
 
 
 def _complete(found: Equilibria) -> list[str]:
-    """Whether the list is all, or how it was sought."""
+    """Describe the proof that the list is complete, or how the list was searched."""
     if found.subdivision is None:
-        return [f"the others are found, not proved to be all: {found.search.words}"]
+        return [f"the other equilibria are found, not proved to be all: {found.search.words}"]
     if not found.subdivision.complete:
         return [
-            f"the others are found, not proved to be all: {found.search.words}",
+            f"the other equilibria are found, not proved to be all: {found.search.words}",
             found.subdivision.reason,
             *_alone(found.subdivision),
         ]
@@ -99,49 +99,50 @@ def _complete(found: Equilibria) -> list[str]:
     where = (
         "wherever the legs reach"
         if told.within is None
-        else f"with the point within {told.within:.3g} m of the goal's either way"
+        else f"with each coordinate of the point within {told.within:.3g} m of that at the goal"
     )
     if told.result.struts is not None:
-        where += f", while the platform translates, in {'the one turn' if turns == 1 else f'each of the {turns} turns'}"
-        where += " in which it can"
+        where += ", while the platform translates, in "
+        where += f"{'the only orientation' if turns == 1 else f'all {turns} orientations'} in which it can"
     else:
         where += _turned(found)
     where += "" if told.shorter is None else f", no rod shorter than {1e3 * told.shorter:.3g} mm"
     apart = [f"the joints of {name_all('leg', told.result.unread)} lock"] if told.result.unread else []
     if told.unstretched is not None:
-        apart += [f"leg {' or '.join(told.unstretched)} is stretched or has no length"] if told.unstretched else []
+        apart += [f"leg {' or '.join(told.unstretched)} is stretched or has length zero"] if told.unstretched else []
         apart += [
-            "a watched direction is at right angles to the desired one"
+            "an observed direction is orthogonal to the desired one"
             if told.orthogonal_directions == 1
-            else "both watched directions are at right angles to the desired ones"
+            else "both observed directions are orthogonal to the desired ones"
         ]
     where += f", except for poses at which {', or '.join(apart)}" if apart else ""
     lines = [
-        f"all rests, proved by {told.result.boxes:,} boxes of poses: no other in any working mode of the legs, {where}"
+        f"all equilibria, proved by {told.result.boxes:,} boxes of poses: no other in any working mode of the legs, "
+        + where
     ]
     if told.crossings:
-        lines += [f"except for rests that fill curves, at {told.crossings} points at which the joints of two legs lock"]
+        lines += [f"except for continuous families, at {told.crossings} points where the joints of two legs lock"]
     if told.locked:
         most = max(within for _, within in told.locked)
         lines += [
-            f"except for {len(told.locked)} places, each within {1e3 * most:.2g} mm, at which legs may lock each other:"
+            f"except for {len(told.locked)} positions, each within {1e3 * most:.2g} mm, where legs may lock each other:"
         ]
         places = max(0, math.ceil(-math.log10(most)))
         lines += [f"  ({', '.join(f'{round(float(x), places) + 0.0:g}' for x in p)}) m" for p, _ in told.locked]
     if told.outside_searched:
-        lines += [f"{told.outside_searched} of the list lie where nothing was searched"]
+        lines += [f"{told.outside_searched} of the list lie outside the searched region"]
     return [*lines, *_alone(told)]
 
 
 def _alone(cover: CompletenessReport) -> list[str]:
-    """Critical poses that boxes alone prove, those at which E is least around first."""
+    """Describe the critical poses that only the boxes prove, minima of E first."""
     some = sorted(cover.only_proved, key=lambda each: each.stability in ("saddle", "unstable"))
     left = len(some) - LISTED_SADDLES
     return [
         *(
             [
-                f"{len(some)} critical poses that boxes prove are not listed above, as the robot could not be closed "
-                "there or the command as computed does not vanish (so where joints lock):"
+                f"{len(some)} critical poses that boxes prove are not listed above: the robot was not assembled there, "
+                "or the computed command does not vanish (where joints lock):"
             ]
             if some
             else []
@@ -152,24 +153,28 @@ def _alone(cover: CompletenessReport) -> list[str]:
 
 
 def _describe_enclosed(found: Equilibria, boxed: list[Equilibrium]) -> list[str]:
-    """How many are enclosed, and what that says."""
+    """Describe the enclosures: number, size, proved stability."""
     if not boxed:
         return []
     wide = max(each.shift for each in boxed), max(each.turn for each in boxed)
-    what = "the loops" if not found.measured else f"the loops, of {', '.join(found.measured)} as far as independent"
+    what = "" if not found.measured else f" with the independent equations of {', '.join(found.measured)}"
     return [
-        f"{len(boxed)} of {len(found.points)}: each the only rest in a box of joint coordinates, proved for {what}",
-        f"which puts it within {1e3 * wide[0]:.1g} mm and {wide[1]:.1g} rad; whether it attracts is proved for "
-        f"{sum(each.decided for each in boxed)}",
+        f"{len(boxed)} of {len(found.points)} equilibria, each unique within {1e3 * wide[0]:.1g} mm and "
+        f"{wide[1]:.1g} rad (proved{what}); stability proved for {sum(each.decided for each in boxed)}"
     ]
 
 
 def _lines(rests: list[Equilibrium]) -> tuple[list[list[str]], list[int]]:
-    """A row a rest, and one, with their number, of those whose rows would be equal: rods point the other way, or other
-    links stand elsewhere, as rests with the same poses and measurements are one."""
+    """Return a row per equilibrium; those with equal rows share one, with their number: they differ in unobserved rods
+    or other links."""
     rows = Counter(tuple(_line(each)) for each in rests)
     return [
-        [*row, notes if count == 1 else f"{notes}{'; ' * bool(notes)}{count} rests, whose links stand differently"]
+        [
+            *row,
+            notes
+            if count == 1
+            else f"{notes}{'; ' * bool(notes)}{count} equilibria with different poses of other links",
+        ]
         for (*row, notes), count in rows.items()
     ], list(rows.values())
 
@@ -181,7 +186,7 @@ def _line(each: Equilibrium) -> list[str]:
     if each.reversed:
         notes.append(f"{name_all('leg', each.reversed)} reversed")
     if each.orthogonal_legs:
-        notes.append(f"{name_all('leg', each.orthogonal_legs)} at right angles")
+        notes.append(f"{name_all('leg', each.orthogonal_legs)} orthogonal to the desired directions")
     if each.working_modes > 1:
         notes.append(f"in {each.working_modes} working modes")
     if each.side == "other":
@@ -189,11 +194,13 @@ def _line(each: Equilibrium) -> list[str]:
     if each.legs_in_other_mode:
         notes.append(f"{name_all('leg', each.legs_in_other_mode)} in another working mode")
     if each.beyond_limits:
-        notes.append(f"beyond the limits of {', '.join(each.beyond_limits)}")
+        notes.append(f"beyond joint limits: {', '.join(each.beyond_limits)}")
     if each.kind == "critical" and each.stable and each.error <= measurement_bound(MEASUREMENT_BOUND):
-        notes.append(f"a near mode: no direction differs by more than {degrees(each.error)}")
+        notes.append(f"near mode: directions differ by at most {degrees(each.error)}")
     if each.convergence_rates and each.kind == "critical":
-        notes.append(f"rates {', '.join(f'{(low + high) / 2:.3g}' for low, high in each.convergence_rates)}")
+        notes.append(
+            f"convergence rates {', '.join(f'{(low + high) / 2:.3g}' for low, high in each.convergence_rates)}"
+        )
     return [
         each.kind,
         f"{each.error:.3g}" if each.kind == "critical" else "0",
@@ -212,24 +219,24 @@ def _signs(each: SignedModes, found: Equilibria) -> str:
         return f"poses {which}: {each.boxes}, proved to be all by boxes of poses{_turned(found, each.turns)}"
     more = each.turns > 1 and each.boxes is not None
     return f"poses {which}: {each.listed.count}, {all_of(each.listed)}" + (
-        f"; {each.boxes} in the {each.turns} turns in which the platform translates" if more else ""
+        f"; {each.boxes} in the {each.turns} orientations in which the platform translates" if more else ""
     )
 
 
 def _turned(found: Equilibria, turns: int = 1) -> str:
-    """How a platform that only translates is turned where boxes looked; empty where it turns."""
+    """Describe the orientations that the boxes cover, of a platform that only translates; empty if it rotates."""
     if found.setup.motion.rotations.shape[1]:
         return ""
     return (
-        ", with the platform turned as at the goal"
+        ", in the orientation of the goal"
         if turns == 1
-        else f", in the {turns} turns in which the platform translates"
+        else f", in the {turns} orientations in which the platform translates"
     )
 
 
 def _why(each: Equilibrium) -> str:
     return (
-        f", {name_all('leg', each.orthogonal_legs)} at right angles to the desired directions"
+        f", {name_all('leg', each.orthogonal_legs)} orthogonal to the desired directions"
         if each.orthogonal_legs
         else ""
     )

@@ -1,4 +1,4 @@
-"""What ``lint`` found: as lines for people, as annotations of GitHub, as SARIF 2.1.0."""
+"""Findings of ``lint``: as text, as annotations of GitHub, as SARIF 2.1.0."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ if TYPE_CHECKING:
 
 SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 LEVELS = {"error": "error", "warning": "warning", "note": "notice"}
-"""What GitHub calls them."""
+"""Names of the severities on GitHub."""
 
 
 def lint(found: Lint) -> str:
-    """A line a finding, what mends it below the first of its rule in each file, the numbers last."""
+    """Return a line per finding, the advice below the first of its rule in each file, the counts last."""
     lines, told = [], set[tuple[str, str, str | None]]()
     for each in found.findings:
         lines.append(f"{each.where}: {each.severity}: {each.message} [{each.rule}]")
         advice = (each.file, each.rule, each.advice)
         if each.advice is not None and advice not in told:
             told.add(advice)
-            lines.append(f"    → {each.advice}{' (--fix does it)' if each.fixable else ''}")
-    lines += [f"{each.where}: mended: {each.message} [{each.rule}]" for each in found.fixed]
+            lines.append(f"    → {each.advice}{' (--fix applies it)' if each.fixable else ''}")
+    lines += [f"{each.where}: fixed: {each.message} [{each.rule}]" for each in found.fixed]
     if found.written is not None:
-        lines.append(f"The mended file is written to {found.written}.")
+        lines.append(f"The fixed file is written to {found.written}.")
     return "\n".join([*lines, found.headline()])
 
 
 def github(found: Lint) -> str:
-    """A workflow command of GitHub's a finding."""
+    """Return a workflow command of GitHub per finding."""
     unread = [Finding("unread", "error", each.file, each.line, each.text) for each in found.unread]
     return "\n".join(_command(each) for each in (*unread, *found.findings))
 
@@ -58,7 +58,7 @@ def _escape(text: str, more: Mapping[str, str] | None = None) -> str:
 
 
 def sarif(found: Lint) -> str:
-    """A log in the Static Analysis Results Interchange Format, version 2.1.0."""
+    """Return a log in the Static Analysis Results Interchange Format, version 2.1.0."""
     from ...linting.rules import lint_rules
 
     rules = [rule for rule in lint_rules().values() if rule.name in found.rules]

@@ -1,4 +1,4 @@
-"""Poses in text: those that were checked, where a freedom is lost, all assembly modes, paths without a singularity."""
+"""Poses in text: checked poses, singularities, assembly modes, paths without a singularity."""
 
 from __future__ import annotations
 
@@ -51,13 +51,13 @@ STATES = {
     "type2": "Type 2 singularity",
     "type3": "Type 3 singularity (Type 1 and 2 at once)",
     CONSTRAINT: "constraint singularity",
-    UNDECIDED: "not decided",
+    UNDECIDED: "undecided",
 }
-_SINCE = {"hidden": "the observed directions", "real": "the motors' coordinates"}
+_SINCE = {"hidden": "observed directions", "real": "motor coordinates"}
 
 
 def check(found: Check) -> str:
-    """What is observed, a block for each pose, then redundant constraints and the grid in numbers."""
+    """Return the observations, a block for each pose, the redundant constraints and the counts of the grid."""
     seen = [f"{leg} ({', '.join(each)})" for leg, each in describe_watched(found.setup).items()]
     generic, written = found.setup.mobility, found.as_written
     rows = [
@@ -90,9 +90,9 @@ def check(found: Check) -> str:
                 [
                     f"{size}: " + ", ".join(f"{counts[state]} {state}" for state in sorted(counts)),
                     *([found.grid.dependent] if found.grid.dependent else []),
-                    *([f"{beyond} beyond limits of joints"] if beyond else []),
-                    *([f"held: {fixed}"] if fixed else []),
-                    f"free, at each pose nearest to the zero configuration: {free}" if free else "no part is free",
+                    *([f"{beyond} beyond joint limits"] if beyond else []),
+                    *([f"fixed: {fixed}"] if fixed else []),
+                    f"free, chosen nearest to the zero configuration: {free}" if free else "no free coordinate",
                 ],
             )
         )
@@ -100,17 +100,17 @@ def check(found: Check) -> str:
 
 
 def _redundant_row(found: Checked) -> tuple[str, str | list[str]]:
-    """The redundant constraints of each loop."""
-    each_loop = [f"the loop {each.loop}: {each.rows} of its constraints" for each in found.redundant]
-    return "redundant", each_loop or "no constraint"
+    """Return the row of the redundant constraints of each loop."""
+    each_loop = [f"loop {each.loop}: {each.rows} of its constraints" for each in found.redundant]
+    return "redundant", each_loop or "none"
 
 
 def loop_check(found: LoopCheck) -> str:
-    """What the loops alone say, and what it takes to say more."""
+    """Return the mobility and rank of the loops, and the options needed for more."""
     told = found.constraints
-    counted = f"{told.smallest_kept:.2g} is the weakest singular value that counts, {told.largest_dropped:.1g} "
-    values = [f"{told.rank} independent of {told.rows}; as parts of the largest,"]
-    values += [f"{counted}the strongest that does not (gap {told.gap:.1e}, needed {RANK_GAP:.0e})"]
+    values = [f"{told.rank} independent of {told.rows}; singular values relative to the largest:"]
+    values += [f"smallest kept {told.smallest_kept:.2g}, largest dropped {told.largest_dropped:.1g} "]
+    values[1] += f"(gap {told.gap:.1e}, needed {RANK_GAP:.0e})"
     return listing(
         [
             ("robot", found.robot.name),
@@ -123,13 +123,13 @@ def loop_check(found: LoopCheck) -> str:
             _redundant_row(found),
             ("lengths in", f"{found.length:.4g} m (the characteristic length), angles in radians"),
             *GAP,
-            ("to say more", [line for each in found.more for line in wrap_lines(each, LINE - NAMES)]),
+            ("for more", [line for each in found.more for line in wrap_lines(each, LINE - NAMES)]),
         ]
     )
 
 
 def _free(grid: GridCheck) -> Iterator[str]:
-    """The parts of the pose that a grid leaves free, positions with their range."""
+    """Yield the coordinates that a grid leaves free, positions with their range."""
     poses = [each.pose for each in grid.postures if each is not None]
     for name in grid.free:
         values = [value for pose in poses if (value := getattr(pose, name, None)) is not None]
@@ -145,22 +145,21 @@ def _posture(posture: ConfigurationReport, length: float, setup: ObservedRobot) 
         *joint_rows(posture.coordinates, posture.beyond_limits),
         *(
             (
-                "flat wrist",
-                f"the R that make {name} one S are {math.degrees(angle):.2g} degrees from where their "
-                "axes lie in a plane and turn it in two ways: not counted below",
+                "singular S",
+                f"revolute axes of the spherical joint {name}: {math.degrees(angle):.2g} deg from coplanar, where they "
+                "rotate it about two axes only; not counted below",
             )
             for name, angle in posture.singular_spherical_joints.items()
         ),
         (
             "mobility",
-            f"{mobility.total}, of which {mobility.internal} idle; the {whose} "
-            + ("one freedom" if dof == 1 else f"{dof} freedoms"),
+            f"{mobility.total}, of which {mobility.internal} internal; the {whose} {dof} dof",
         ),
         *_kinds(
             "hidden robot",
             f"the {shown} show {posture.hidden.rank} of {dof}",
             posture.hidden,
-            "not seen",
+            "unobserved",
             whole=posture.hidden.rank == dof,
         ),
         *([] if posture.formation is None else [("verdict here", posture.formation.verdict)]),
@@ -170,52 +169,52 @@ def _posture(posture: ConfigurationReport, length: float, setup: ObservedRobot) 
         rows += [
             ("", f"singular values of Mᵀ {far.type2:.3g} to {1 / far.type1:.3g}, condition {far.condition:.3g}"),
             *(
-                [("", f"one degree of error in the {shown}{_describe_moved(far, length)}")]
+                [("error gain", _describe_gain(far, length, shown[:-1]))]
                 if all(each.angular for each in setup.observed)
                 else []
             ),
         ]
         if far.condition > 1 / NOISE:
-            rows.append(("", f"nearly singular: dimensions known to {NOISE:g} cannot tell it from a singularity"))
+            rows.append(
+                ("", f"nearly singular: not distinguishable from a singularity with dimensions known to {NOISE:g}")
+            )
     elif far.type2 is None:
         rows.append(("", NO_MATRIX))
     if posture.real is None:
-        rows.append(("real robot", "has no motors: --motors names them"))
+        rows.append(("real robot", "no motors; name them with --motors"))
     else:
-        rows += _kinds("real robot", f"the motors determine {posture.real.rank} of {dof}", posture.real, "not held")
+        rows += _kinds("real robot", f"the motors determine {posture.real.rank} of {dof}", posture.real, "undetermined")
     if posture.constraint_singular:
-        rows.append(("loops", ["lose rank here, the platform has", *(freedom.name for freedom in posture.gained)]))
-    rows += [
-        ("redundant here", f"the loop {each.loop}: {each.rows} more of its constraints") for each in posture.redundant
-    ]
-    return [*rows, ("loops' margin", f"{far.constraints:.3g} (weakest singular value, as part of the largest)")]
+        rows.append(("loops", ["lose rank here; the platform gains", *(freedom.name for freedom in posture.gained)]))
+    rows += [("redundant here", f"loop {each.loop}: {each.rows} more of its constraints") for each in posture.redundant]
+    return [*rows, ("loop Jacobian", f"smallest singular value {far.constraints:.3g}, relative to the largest")]
 
 
 def _kinds(name: str, what: str, kinds: SingularityReport, lost: str, *, whole: bool = True) -> Rows:
     state = STATES[kinds.state] if whole or kinds.state != REGULAR else "as many as at generic poses, not singular"
     if kinds.singularity_indices is not None and kinds.singularity_indices.RO < 0:
-        state += f", but special: {-kinds.singularity_indices.RO} fewer are lost than at generic poses"
+        state += f", but not generic: {-kinds.singularity_indices.RO} fewer unobserved than at generic poses"
     title = f"{what}: {state} (smallest rank gap {kinds.gap:.1e}, needed {RANK_GAP:.0e})"
     if kinds.singularity_indices is None:
         return [(name, title)]
     counts = "  ".join(f"{key} {value}" for key, value in kinds.singularity_indices.to_dict().items())
     return [
-        (name, [title, f"over the generic values: {counts}"]),
+        (name, [title, f"above the generic values: {counts}"]),
         *((lost, freedom.name) for freedom in kinds.unobserved),
     ]
 
 
-def _describe_moved(far: SingularityDistances, length: float) -> str:
-    """How far one degree of error moves the platform, where that is a small motion."""
+def _describe_gain(far: SingularityDistances, length: float, measured: str) -> str:
+    """Describe the motion of the platform for one degree of error, if it is small enough for the first order."""
     if (
         far.millimetres is None
         or far.degrees is None
         or not (is_bounded(far.millimetres / 1e3, length) and is_bounded(math.radians(far.degrees)))
     ):
-        return f": {NOT_BOUNDED}"
+        return f"{NOT_BOUNDED}, per degree of {measured} error"
     return (
-        f", to first order: {_small(far.millimetres)} mm and {_small(far.degrees)} degrees along the weakest "
-        "freedom that they show"
+        f"{_small(far.millimetres)} mm and {_small(far.degrees)} deg per degree of {measured} error "
+        "(first order, least observable twist)"
     )
 
 
@@ -224,7 +223,7 @@ def _small(value: float) -> str:
 
 
 def singularity(found: Singularity) -> str:
-    """The condition in words and as an expression, what was checked, and singular poses."""
+    """Return the condition in words and as an expression, the checks, and singular poses."""
     condition, checked = found.condition, found.checked
     name, seen = head(found.setup)
     motors = dict.fromkeys(str(getattr(o, "joint", o.link)) for o in found.observation_model.observations)
@@ -239,7 +238,7 @@ def singularity(found: Singularity) -> str:
             ("expression", f"{condition.expression}{' (never zero)' if condition.never else ' = 0'}"),
             ("factors", [f"{part}: {meaning}" for part, meaning in condition.parts]),
             ("where", [f"{name}: {meaning}" for name, meaning in condition.where.items()]),
-            ("split off", list(condition.factors)),
+            ("trivial factors", list(condition.factors)),
         ]
     rows.append(("loops", list(found.unexamined)))
     if checked is not None:
@@ -248,12 +247,12 @@ def singularity(found: Singularity) -> str:
                 "checked",
                 [
                     f"{checked.points} random poses and {len(checked.on_locus)} on the locus, {checked.disagreements} "
-                    "disagreements of words, expression and rank",
+                    "disagreements of condition, expression and rank",
                     *(
                         []
                         if isinstance(condition, General)
                         else [
-                            "largest angle between a leg's named wrenches and the rank's "
+                            "largest angle between the named wrenches of a leg and the numerical ones "
                             f"{checked.largest_angle:.1e} rad"
                         ]
                     ),
@@ -266,7 +265,7 @@ def singularity(found: Singularity) -> str:
             )
     if condition is not None and not condition.never and not found.examples:
         searches = 0 if checked is None else checked.searches
-        rows.append(("singular at", f"not found by {searches} searches, which does not mean that there are none"))
+        rows.append(("singular at", f"none found by {searches} searches, which does not exclude any"))
     rows.append(
         (
             "singular at",
@@ -275,7 +274,7 @@ def singularity(found: Singularity) -> str:
                 for each in found.examples
                 for line in (
                     str(each.pose),
-                    f"  singular value {each.sigma:.1e}, a centimetre away up to {each.nearby:.1e}; lost: "
+                    f"  singular value {each.sigma:.1e}, 1 cm away up to {each.nearby:.1e}; unobserved: "
                     + "; ".join(freedom.name for freedom in each.unobserved),
                 )
             ],
@@ -285,12 +284,12 @@ def singularity(found: Singularity) -> str:
 
 
 def modes(found: AssemblyModes) -> str:
-    """The pose whose measurements are held, the count with its proof, a block for each mode."""
+    """Return the pose with the fixed measured values, the count with its proof, a block for each mode."""
     count = found.found
     name, seen = head(found.setup)
     if found.formation is not None:
         return _describe_formation(found, [name, seen, *formation(found.formation)])
-    rows = [name, *([seen] if found.kind == "hidden" else []), ("held", f"{_describe_held(found)} at {found.pose}")]
+    rows = [name, *([seen] if found.kind == "hidden" else []), ("fixed", f"{_describe_held(found)} at {found.pose}")]
     if found.near_modes:
         rows += [
             ("alike", f"{found.alike} (found, not proved, for errors up to {np.degrees(found.measurement_bound):.3g}°)")
@@ -301,24 +300,27 @@ def modes(found: AssemblyModes) -> str:
         legs = ", ".join(found.labels[k] for k in each.legs)
         rows.append(
             (
-                "meant",
+                "snapped",
                 f"legs {legs} share a joint centre of the {each.where} (to {each.defect:.1e} m; "
-                "--as-written takes the numbers as they are)",
+                "use --as-written to keep the numbers)",
             )
         )
-    rows += [*known_row("special", count.singular_solutions), *dropped_limits(found.setup)]
+    rows += [*known_row("singular", count.singular_solutions), *dropped_limits(found.setup)]
     for number, motion in enumerate(found.self_motions, 1):
-        place = "the pose itself" if motion.goal else str(found.pose_of(motion))
+        place = "the given pose" if motion.goal else str(found.pose_of(motion))
         starts = f"{motion.hits} start{'s' * (motion.hits > 1)}"
-        met = f"; {starts} ended on it, or on one like it" if motion.hits else ""
-        rows += [*GAP, (f"motion {number}", [f"through {place}, found, not proved: a self-motion {motion.words}{met}"])]
+        met = f"; {starts} ended on it or an equal one" if motion.hits else ""
+        rows += [
+            *GAP,
+            (f"motion {number}", [f"through {place}", f"found, not proved: a self-motion {motion.words}{met}"]),
+        ]
     for number, mode in enumerate(found.modes, 1):
         rows += [
             *GAP,
             (
                 f"mode {number}",
                 [
-                    f"{mode.pose}" + ("   (the pose itself)" if mode.goal else ""),
+                    f"{mode.pose}" + ("   (the given pose)" if mode.goal else ""),
                     proof_words(mode)
                     if mode.match_residual is not None
                     else f"{proof_words(mode)}, residual {mode.residual:.1e}",
@@ -333,7 +335,7 @@ def modes(found: AssemblyModes) -> str:
             (
                 f"antipodal {number}",
                 [
-                    f"{mode.pose}   not a mode: the opposite value of {', '.join(mode.opposite)}",
+                    f"{mode.pose}   not an assembly mode: opposite value of {', '.join(mode.opposite)}",
                     proof_words(mode),
                     *ahead(mode),
                 ],
@@ -345,7 +347,7 @@ def modes(found: AssemblyModes) -> str:
             (
                 f"near {number}",
                 [
-                    f"{mode.pose}   found, not proved; what is measured differs {mode.differs}",
+                    f"{mode.pose}   found, not proved; measured values differ {mode.differs}",
                     *_rests(mode),
                     *ahead(mode),
                     *at_mode(mode, found),
@@ -356,10 +358,10 @@ def modes(found: AssemblyModes) -> str:
 
 
 def _describe_formation(found: AssemblyModes, rows: Rows) -> str:
-    """The count with its proof, a block with the places of all bodies for each mode of a formation."""
+    """Return the count with its proof, and for each mode of a formation a block with the poses of all bodies."""
     if found.found.continuous_family is None:
         rows += [("modes", f"{found.count}, {all_of(found)}"), ("proof", found.found.proof)]
-    rows += known_row("special", found.found.singular_solutions)
+    rows += known_row("singular", found.found.singular_solutions)
     for word, listed in (("mode", found.modes), ("antipodal", found.antipodal)):
         for number, mode in enumerate(listed, 1):
             told = [f"{body}: {Pose.of(X)}" for body, X in (mode.bodies or {}).items()]
@@ -368,11 +370,11 @@ def _describe_formation(found: AssemblyModes, rows: Rows) -> str:
                 (
                     f"{word} {number}",
                     [
-                        *["the configuration itself"] * mode.goal,
-                        *[f"not a mode: the opposite value of {', '.join(mode.opposite)}"] * bool(mode.opposite),
+                        *["the given configuration"] * mode.goal,
+                        *[f"not an assembly mode: opposite value of {', '.join(mode.opposite)}"] * bool(mode.opposite),
                         *told,
                         f"residual {mode.residual:.1e}",
-                        *[f"beyond the limits of {', '.join(mode.beyond_limits)}"] * bool(mode.beyond_limits),
+                        *[f"beyond joint limits: {', '.join(mode.beyond_limits)}"] * bool(mode.beyond_limits),
                     ],
                 ),
             ]
@@ -381,79 +383,78 @@ def _describe_formation(found: AssemblyModes, rows: Rows) -> str:
 
 def _describe_held(found: AssemblyModes) -> str:
     if found.kind == "hidden" and not all(o.by_segment for o in found.setup.observed):
-        return "what is observed"
+        return "measured values"
     return _SINCE[found.kind]
 
 
 def _rests(mode: NearMode) -> list[str]:
-    """What the loop does at a near mode."""
+    """Describe the equilibrium at a near mode."""
     if mode.family:
-        return ["one of a continuous family: the loop may rest at any of them"]
-    return ["the loop rests there, stable"] if mode.stable else []
+        return ["one of a continuous family: the loop may stop at any of them"]
+    return ["a stable equilibrium of the loop"] if mode.stable else []
 
 
 def ahead(mode: AssemblyMode) -> list[str]:
-    """Whether what is seen is in front of the cameras."""
+    """Describe what is behind the cameras, or that nothing is."""
     if mode.behind is None:
         return []
     return [f"behind the camera: {', '.join(mode.behind)}" if mode.behind else "in front of the camera"]
 
 
 def all_of(found: AssemblyModes) -> str:
-    """Whether the modes are all."""
+    """Describe whether the list of modes is complete."""
     if found.found.complete:
         fitting = sum(mode.match_residual is not None and not mode.goal for mode in found.modes)
         return f"proved to be all among {found.within}" + (
-            f"; {fitting} of them fit{'s' * (fitting == 1)}, not proved" if fitting else ""
+            f"; {fitting} of them unproved match{'es' * (fitting > 1)}" if fitting else ""
         )
     return "found, not proved to be all"
 
 
 def proof_words(mode: AssemblyMode) -> str:
-    """What is proved of a mode's place."""
+    """Describe the enclosure of a mode, or why it has none."""
     within = (
         ""
         if not np.isfinite(mode.radius)
         else f"to {mode.shift:.1e} m" + (f", {mode.turn:.1e} rad" if mode.turn else "")
     )
-    known = f"known {within}" if within else "known to no radius"
+    known = f"known {within}" if within else "radius unknown"
     if mode.proved:
         return f"{', '.join(mode.enclosed)}{' ' if mode.enclosed else ''}enclosed {within}"
     if mode.match_residual is not None and mode.goal:
-        return f"a mode by construction, its place not proved, {known}"
+        return f"a mode by construction, pose not proved, {known}"
     if mode.match_residual is not None:
-        return f"fits all legs to {mode.match_residual:.1e}, which does not prove it; if it is a mode, {known}"
+        return f"matches all legs to {mode.match_residual:.1e}, which does not prove it; if it is a mode, {known}"
     if mode.rounded:
         return f"not proved: enclosed {within} for the rounded geometry, not for the file's".replace("  ", " ")
     if mode.multiplicity > 1:
-        return f"not proved, a multiple one {within}".rstrip()
-    return f"{'a mode by construction, its place ' if mode.goal else ''}not proved, {known}"
+        return f"not proved, a singular solution {within}".rstrip()
+    return f"{'a mode by construction, pose ' if mode.goal else ''}not proved, {known}"
 
 
 def at_mode(mode: AssemblyMode, found: AssemblyModes) -> list[str]:
-    """What the real robot does at a mode of a list."""
+    """Describe the assembly of the real robot at a mode, its joints and its distance from a singularity."""
     there, hidden = assembly(mode, found.setup.limits_ignored), found.kind == "hidden"
     there += [f"{name} {told}" for name, told in joint_rows(mode.coordinates)]
     if mode.type2_distance is None:
-        seen = NO_MATRIX if hidden else "the motors can move there while the platform rests"
+        seen = NO_MATRIX if hidden else "the motors can move there while the platform is fixed"
         return [*there, *[seen] * (mode.configuration is not None)]
     matrix = "Mᵀ" if hidden else "the motors' Jacobian (motor rates by platform twist)"
     return [*there, f"smallest singular value of {matrix} {mode.type2_distance:.3g}"]
 
 
 def assembly(mode: AssemblyMode, unlimited: Sequence[str] = ()) -> list[str]:
-    """Whether the real robot can be assembled at a mode, and why not; ``unlimited`` joints have limits that are not
-    looked at."""
+    """Describe whether the real robot can be assembled at a mode; the limits of ``unlimited`` joints are ignored."""
 
     def several(noun: str, labels: Sequence[str]) -> str:
         return f"{noun}{'s' * (len(labels) > 1)} {', '.join(labels)}"
 
     match mode.assembly:
         case "yes":
-            return ["the real robot can be assembled there" + (", as far as limits are looked at" if unlimited else "")]
+            return ["the real robot can be assembled there" + (", some joint limits ignored" if unlimited else "")]
         case "beyond limits":
             return [
-                f"the real robot can be assembled there only beyond limits of joints: as found, of "
+                f"the real robot can be assembled there only beyond joint limits: as found, of "
                 f"{', '.join(mode.beyond_limits)}"
             ]
         case "no":
@@ -462,15 +463,15 @@ def assembly(mode: AssemblyMode, unlimited: Sequence[str] = ()) -> list[str]:
                 *(f"leg {leg}: {miss}" for leg, miss in mode.misses),
             ]
     where = (
-        f"beyond the limits of {', '.join(mode.beyond_limits)}"
+        f"beyond joint limits: {', '.join(mode.beyond_limits)}"
         if mode.beyond_limits
         else f"with {' and '.join(several(*each) for each in mode.left_open)} left open"
     )
-    return [f"the real robot was found assembled there only {where}; whether it can be there otherwise is not known"]
+    return [f"the real robot was found assembled there only {where}; another assembly is not excluded"]
 
 
 def path(found: PathAnswer) -> str:
-    """The verdict with its reason, the values at the two poses, and the path."""
+    """Return the verdict with its reason, the values at the two poses, and the path."""
     value = "expression" if found.signed else "smallest singular value"
     rows = [
         *head(found.setup),
@@ -478,12 +479,12 @@ def path(found: PathAnswer) -> str:
         *joint_rows(found.start.coordinates),
         ("to", f"{found.goal.pose}   ({value} {found.goal.value:.4g})"),
         *joint_rows(found.goal.coordinates),
-        *known_row("", "start and goal are the same pose: there is no path to find" if found.stays else None),
-        ("verdict", [f"{found.verdict} ({'certified' if found.certified else 'not certified'})", found.reason]),
+        *known_row("", "start and goal are the same pose: no path needed" if found.stays else None),
+        ("verdict", [f"{found.verdict} ({'proved' if found.certified else 'not proved'})", found.reason]),
     ]
     if found.margin is not None:
         where = "all along the path" if found.certified and found.segments else "at both poses"
-        rows.append(("margin", f"|{value}| at least {found.margin:.3g} {where}, {found.boxes} intervals"))
+        rows.append(("distance", f"|{value}| at least {found.margin:.3g} {where}, {found.boxes} intervals"))
     if found.segments:
         rows.append(("path" if found.certified else "best path", [str(pose) for pose in found.poses]))
     rows.append(
@@ -495,25 +496,25 @@ def path(found: PathAnswer) -> str:
 
 
 def road(found: SampledRoute, value: str) -> list[str]:
-    """What poses on the straight way say."""
-    signs = {None: "", 0: ", the same sign at all of them"}.get(found.changes, f", {found.changes} changes of its sign")
+    """Describe the samples on the straight path."""
+    signs = {None: "", 0: ", the same sign at all"}.get(found.changes, f", {found.changes} sign changes")
     lines = [
         f"|{value}| at least {found.least:.3g} at {found.count} poses of the straight path, least at {found.at}{signs}"
     ]
     if found.reached < 1:
-        lines.append(f"the robot was not followed further than {100 * found.reached:.0f} % of that path")
-    return lines + [f"{found.out_of_view} is not in front of its camera all along it"] * (found.out_of_view is not None)
+        lines.append(f"the robot was tracked over the first {100 * found.reached:.0f} % of that path only")
+    return lines + [f"{found.out_of_view} is not in front of its camera on all of it"] * (found.out_of_view is not None)
 
 
 _SIGNS = {SAME: "=", SEPARATED: "|", UNDECIDED_PAIR: "?"}
 
 
 def aspects(found: AspectTable) -> str:
-    """The modes, how many aspects hold them, the table mode by mode, and what was asked of which pairs."""
+    """Return the modes, their aspects, the table of pairs, and the verdict on each pair that was examined."""
     listed = found.listed
-    rows = [*head(listed.setup), ("held", f"{_describe_held(listed)} at {listed.pose}")]
+    rows = [*head(listed.setup), ("fixed", f"{_describe_held(listed)} at {listed.pose}")]
     if listed.found.continuous_family is not None:
-        return listing([*rows, *known_row("special", listed.found.singular_solutions)])
+        return listing([*rows, *known_row("singular", listed.found.singular_solutions)])
     rows += [
         ("modes", f"{listed.count}, {all_of(listed)}"),
         ("aspects", f"{found.aspects_met} of the hidden robot: {aspect_groups(found)}"),
@@ -532,40 +533,40 @@ def aspects(found: AspectTable) -> str:
         if pair.answer is not None or pair.verdict == UNDECIDED_PAIR:
             told.setdefault(pair_words(pair), []).append("{}, {}".format(*pair.numbers))
     rows += [
-        (first, [words, *textwrap.wrap("; ".join(rest), initial_indent="so are modes ")])
+        (first, [words, *textwrap.wrap("; ".join(rest), initial_indent="as are modes ")])
         for words, (first, *rest) in told.items()
     ]
     paths = [pair.answer for pair in found.pairs if pair.verdict == SAME and pair.answer is not None]
     passed = ", ".join(dict.fromkeys(name for each in paths for name in each.limits_ignored))
-    return listing([*rows, *known_row("not proved", f"limits of joints {passed}" if passed else None)])
+    return listing([*rows, *known_row("not proved", f"joint limits of {passed}" if passed else None)])
 
 
 def aspect_groups(found: AspectTable) -> str:
-    """The modes of each aspect."""
+    """List the modes of each aspect."""
     return "; ".join(f"mode{'s' * (len(group) > 1)} {', '.join(map(str, group))}" for group in found.groups)
 
 
 def _cuspidal(found: AspectTable) -> list[str]:
     changes = found.changes
     if not changes:
-        return ["not shown by the modes at this pose, which says nothing about other poses"]
+        return ["not shown by the modes at this pose; other poses are not examined"]
     direct = [pair for pair in changes if pair.answer is not None and not pair.answer.crossings]
     one, other = (direct or changes)[0].numbers
     how = "no leg changes its working mode" if direct else "legs change their working modes"
     return [
-        f"yes: modes {one} and {other} have the same directions, and a certified path without",
+        f"yes: modes {one} and {other} have the same directions, and a proved path without",
         f"Type 2 singularity leads from one to the other; {how} on it",
     ]
 
 
 def pair_words(pair: ModePair) -> str:
-    """The verdict on two modes, and what shows it."""
-    certified = "" if pair.verdict == UNDECIDED_PAIR else f" ({'certified' if pair.certified else 'not certified'})"
+    """Describe the verdict on two modes and its reason."""
+    certified = "" if pair.verdict == UNDECIDED_PAIR else f" ({'proved' if pair.certified else 'not proved'})"
     found = pair.answer
     if found is None or pair.verdict != SAME:
         return f"{pair.verdict}{certified}: {pair.reason}"
     bends = len(found.poses) - 2
-    way = "straight" if not bends else f"over {bends} pose{'s' * (bends > 1)}"
+    way = "straight" if not bends else f"via {bends} pose{'s' * (bends > 1)}"
     crossed = dict.fromkeys(leg for leg, _ in found.crossings)
     legs = f", changing the working mode of leg {', '.join(crossed)}" if crossed else ""
-    return f"{pair.verdict}{certified}: {way}{legs}; margin {found.margin:.3g}, {found.boxes} intervals"
+    return f"{pair.verdict}{certified}: {way}{legs}; distance {found.margin:.3g}, {found.boxes} intervals"

@@ -1,4 +1,4 @@
-"""A robot and what a camera sees of it: as it was read, its hidden robot, its sets of legs, what is missing, in 3D."""
+"""Robots in text: as read, hidden robot, leg sets, suggestions, exported code, 3D view."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ if TYPE_CHECKING:
     from ...rewrite.strategy import Step
     from ..view.view import View
 
-NO_FREEDOM = "the platform has no freedom"
-NO_MATRIX = "there is no interaction matrix: observed links move while the platform rests"
+NO_FREEDOM = "the platform cannot move"
+NO_MATRIX = "no interaction matrix: observed links move while the platform is fixed"
 _KINDS = {
     "leg": "leg (direction of its default segment)",
     "direction": "direction of another link",
@@ -51,11 +51,11 @@ _KINDS = {
     "offered": "--sensor",
 }
 _SHOWN = 6
-"""Sets of measurements listed at most."""
+"""Largest number of sets of measurements that are listed."""
 
 
 def robot(found: Mechanism) -> str:
-    """Name, size and motors; legs with their default segments, where the mechanism has legs; notes of its reading."""
+    """Return name, size and motors, the legs with their default segments, and the notes of reading."""
     from ...mechanism.legs import decompose
     from ...mechanism.normal import normal_form
     from ...mechanism.sensors import defaults_of
@@ -63,32 +63,29 @@ def robot(found: Mechanism) -> str:
     rows: Rows = [
         ("links, joints", f"{len(found.links)}, {len(found.joints)}"),
         ("base", found.base),
-        ("bodies", ", ".join(found.bodies)) if found.formation else ("platform", found.platform_words),
+        ("platform links", ", ".join(found.bodies)) if found.formation else ("platform", found.platform_words),
         ("motors", ", ".join(joint.name for joint in found.joints.values() if joint.actuated) or "none"),
         *known_row("camera on", found.reference if found.reference != found.base else None),
     ]
     try:
         decomposition = decompose(normal_form(found).mechanism)
         rows.insert(0, ("robot", f"{found.name}   {decomposition.architecture()}"))
-        watched = {label: f"watched at {o.link}" for label, o in defaults_of(decomposition).items()}
-        rows += [
-            (f"leg {leg.label}", watched.get(leg.label, "no segment with a direction of its own"))
-            for leg in decomposition.legs
-        ]
+        watched = {label: f"observed at {o.link}" for label, o in defaults_of(decomposition).items()}
+        rows += [(f"leg {leg.label}", watched.get(leg.label, "no observable segment")) for leg in decomposition.legs]
     except HrsynthError as error:
         rows[:0] = [("robot", [found.name, str(error)])]
     return listing([*rows, ("note", [str(note) for note in found.notes])])
 
 
 def derivation(found: Derivation) -> str:
-    """The hidden robot first, the proof next, the trace last."""
+    """Return the hidden robot, the verdict, the equivalence check, and the steps."""
     mobility, hidden, unchecked, observed = found.mobility, found.hidden_architecture, found.unchecked, found.setup
-    dof = [f"{found.dof} (mobility {mobility.total}, of which {mobility.internal} idle)"]
+    dof = [f"{found.dof} (mobility {mobility.total}, of which {mobility.internal} internal)"]
     if observed.decomposition.point is not None:
-        dof.append("the platform is a point: its velocity is controlled, its rotation is idle")
+        dof.append("the platform is a point: its velocity is controlled, its rotation is an internal motion")
     name, seen = head(observed)
     if found.verdict.formation is not None:
-        dof[0] = f"{found.dof} of {len(found.verdict.formation.bodies)} bodies{dof[0].removeprefix(str(found.dof))}"
+        dof[0] = f"{found.dof} of {len(found.verdict.formation.bodies)} links{dof[0].removeprefix(str(found.dof))}"
     rows: Rows = [
         name,
         *_ends(observed.decomposition),
@@ -105,12 +102,12 @@ def derivation(found: Derivation) -> str:
             ],
         ),
         *formation(found.verdict.formation),
-        ("mode", _modes(observed)),
+        ("operation mode", _modes(observed)),
         ("architecture", wrap_lines(exact_words(found.exact, found.verdict.rank), LINE - NAMES)),
         *lost_rows(found.verdict),
         ("at zero", [f"{each} (hrsynth check)" for each in at_zero(found.verdict)]),
         ("", [] if found.verdict.has_interaction_matrix else NO_MATRIX),
-        ("certificate", wrap_lines(certificate(found.equivalence), LINE - NAMES)),
+        ("equivalence", wrap_lines(certificate(found.equivalence), LINE - NAMES)),
         ("equal where", wrap_lines("; ".join(found.equal_where), LINE - NAMES) if hidden else []),
     ]
     if unchecked is not None:
@@ -125,11 +122,13 @@ def derivation(found: Derivation) -> str:
                 ],
             )
         )
-    return "\n".join([listing(rows), "", table(list(_attempts(found.steps)), ("rule", "leg", "taken", "angle", "why"))])
+    return "\n".join(
+        [listing(rows), "", table(list(_attempts(found.steps)), ("rule", "leg", "accepted", "angle", "reason"))]
+    )
 
 
 def _ends(decomposition: LegDecomposition) -> Rows:
-    """The link of an articulated platform on which each leg ends: with the same letters it makes another robot."""
+    """Return the row of the platform links on which the legs of an articulated platform end."""
     links = {
         leg.platform_link: [each.label for each in decomposition.legs if each.platform_link == leg.platform_link]
         for leg in decomposition.legs
@@ -142,7 +141,7 @@ def _ends(decomposition: LegDecomposition) -> Rows:
 
 
 def _attempts(steps: Sequence[Step]) -> Iterator[tuple[str, ...]]:
-    """A line a step; of a rule's proposals that were taken back the first is shown, and how many more there were."""
+    """Yield a row per step; of consecutive discarded proposals of a rule the first, and the number of the others."""
     for back, each in groupby(steps, lambda step: step.discarded):
         run = list(each)
         starts = [i for i, step in enumerate(run) if step.rule == run[0].rule] if back else [0]
@@ -155,46 +154,46 @@ def _attempts(steps: Sequence[Step]) -> Iterator[tuple[str, ...]]:
                 run[0].leg or "all",
                 "no",
                 "",
-                (f"{len(starts) - 1} more proposals, taken back as well (--json lists them)"),
+                (f"{len(starts) - 1} more proposals, also discarded (--json lists them)"),
             )
 
 
 def lost_rows(found: Verdict) -> Rows:
-    """The freedoms that are not seen; at zero, where their names do not say where the platform is."""
+    """Return the row of unobserved dof; at zero, unless their names contain the pose."""
     names = [freedom.name for freedom in found.unobserved]
-    return [("lost" if any(ELSEWHERE in name for name in names) else "lost at zero", names)]
+    return [("unobserved" if any(ELSEWHERE in name for name in names) else "unobserved at zero", names)]
 
 
 def at_zero(found: Verdict) -> list[str]:
-    """That the zero configuration shows fewer freedoms than others, where it does."""
+    """Return a note if the rank at the zero configuration is lower than elsewhere."""
     rank = found.rank_at_zero
     if rank is None:
         return []
     return [
-        f"{f'only {rank}' if rank else 'none'} of {found.dof} freedoms seen: the zero configuration is a Type 2 "
+        f"{f'only {rank}' if rank else 'none'} of {found.dof} dof observed: the zero configuration is a Type 2 "
         "singularity"
     ]
 
 
 def formation(found: Formation | None) -> Rows:
-    """What is not seen of a formation."""
+    """Return the rows of the trivial motions and flexes of a formation."""
     if found is None:
         return []
     return [
-        ("trivial", list(found.trivial) or "no motion: all are seen, or flexes"),
+        ("trivial", list(found.trivial) or "none"),
         ("flexes", [each.name for each in found.flexes] or "none"),
-        *known_row("special", found.special or None),
+        *known_row("not generic", found.special or None),
     ]
 
 
 def _modes(observed: ObservedRobot) -> list[str]:
-    """For which operation mode a verdict holds, where others were met."""
+    """Name the operation mode of a verdict, if others were found."""
     found = observed.beside()
     own = observed.all_samples.signature
     return (
         [
-            f"for the operation mode of the zero configuration: {own.dof} dof ({own.motion}), mobility {own.mobility}",
-            *(f"another that was met: {text}" for text in found),
+            f"that of the zero configuration: {own.dof} dof ({own.motion}), mobility {own.mobility}",
+            *(f"another that was found: {text}" for text in found),
         ]
         if found
         else []
@@ -202,73 +201,73 @@ def _modes(observed: ObservedRobot) -> list[str]:
 
 
 def near(found: Verdict) -> str:
-    """How far a verdict is from another one, where that is not far."""
+    """Describe how near a verdict is to another one."""
     counts = found.rank and found.smallest_kept < SURELY_SOMETHING
     return (
-        f"near another verdict: a motion that counts as {'seen' if counts else 'not seen'} has the singular value "
+        f"near another verdict: {'smallest kept' if counts else 'largest dropped'} singular value "
         f"{found.smallest_kept if counts else found.largest_dropped:.1e}, "
-        f"which counts above {RANK_CUTOFF:.0e} (rates of the directions, characteristic lengths, radians)"
+        f"threshold {RANK_CUTOFF:.0e} (rates of the directions, characteristic lengths, radians)"
     )
 
 
 def certificate(found: EquivalenceCheck) -> str:
-    """How closely the hidden robot agrees with the real one, and how closely it must."""
+    """Describe the equivalence check of the hidden robot, with its tolerances."""
     return (
         f"{'passed' if found.passed else 'FAILED'} at {found.samples} configurations"
         f" ({found.discarded} discarded): {found.reason + '; ' if found.reason else ''}"
         f"largest angle {found.largest_angle:.1e} (allowed {SAME_RELATION:.0e}), smallest rank gap "
-        f"{found.smallest_gap:.1e} (needed {RANK_GAP:.0e}), follows to {found.residual:.1e}"
+        f"{found.smallest_gap:.1e} (needed {RANK_GAP:.0e}), assembly residual {found.residual:.1e}"
     )
 
 
 def verdict(found: Verdict) -> str:
-    """What a set of legs sees, and what it does not."""
+    """Return the verdict on a set of legs and its unobserved dof."""
     return listing(
         [
             ("legs", ", ".join(found.legs)),
             ("verdict", f"{found.verdict} (rank {found.rank} of {found.dof})"),
-            ("lost", [freedom.name for freedom in found.unobserved]),
+            ("unobserved", [freedom.name for freedom in found.unobserved]),
         ]
     )
 
 
 def exact_words(exact: ExactVerdict, rank: int) -> str:
-    """The architecture's verdict beside the ``rank`` that the robot itself shows."""
+    """Describe the verdict on the architecture, and its difference from the ``rank`` of this robot."""
     if exact.rank is None:
-        return f"not decided: {exact.reason}"
+        return f"undecided: {exact.reason}"
     text = f"{exact.verdict}, {exact.reason}"
     if exact.rank == rank:
         return text
     return (
-        f"{text}: generic geometry sees {exact.rank} of {exact.dof} freedoms, this robot {rank}, because of its "
+        f"{text}: rank {exact.rank} of {exact.dof} for generic geometry, {rank} for this robot, because of its "
         "dimensions"
     )
 
 
 def exact_cell(exact: ExactVerdict, rank: int) -> str:
-    """The same in a cell of a table."""
+    """Return :func:`exact_words` as a cell of a table."""
     if exact.rank is None:
-        return "not decided"
+        return "undecided"
     text = "proved" if exact.proved else f"{exact.instances} instance" + "s" * (exact.instances > 1)
-    return text if exact.rank == rank else f"{text}, of generic geometry: {exact.rank} of {exact.dof}"
+    return text if exact.rank == rank else f"{text}, generic geometry: {exact.rank} of {exact.dof}"
 
 
 def unseen(found: Verdict) -> str:
-    """What a set of legs does not see, in a cell of a table."""
+    """Name the unobserved dof of a set of legs, as a cell of a table."""
     if found.formation is None:
         return "; ".join(freedom.name for freedom in found.unobserved)
     return f"{len(found.formation.trivial)} trivial" + "".join(f"; {flex.name}" for flex in found.formation.flexes)
 
 
 def legs(found: Legs) -> str:
-    """The smallest sets of the best rank, and one line a set of legs."""
+    """Return the smallest sets of the best rank, and a row per set of legs."""
     rows = [
         (", ".join(each.legs), each.verdict, f"{each.rank} of {each.dof}", exact_cell(exact, each.rank), unseen(each))
         for each, exact in zip(found.sets, found.exact, strict=True)
     ]
-    lost = "lost" if any(ELSEWHERE in row[-1] for row in rows) else f"lost (at {found.where})"
+    lost = "unobserved" if any(ELSEWHERE in row[-1] for row in rows) else f"unobserved (at {found.where})"
     if found.setup.mechanism.formation:
-        lost = f"not seen (at {found.where})"
+        lost = f"unobserved (at {found.where})"
     lines = [
         f"{found.robot}   {found.architecture}   {found.dof} dof",
         f"platform: {found.setup.robot.platform_words}",
@@ -284,7 +283,7 @@ def legs(found: Legs) -> str:
         ),
     ]
     lines += [
-        f"not decided in exact arithmetic: {reason}"
+        f"undecided in exact arithmetic: {reason}"
         for reason in dict.fromkeys(each.reason for each in found.exact if not each.exact)
     ]
     chance = max(each.chance for each in found.exact)
@@ -298,48 +297,48 @@ def legs(found: Legs) -> str:
     ]
     if fewer:
         lines += wrap_lines(
-            f"at {found.where}, a Type 2 singularity with these, fewer freedoms are seen: " + "  ".join(fewer),
+            f"lower rank at {found.where}, a Type 2 singularity with these sets: " + "  ".join(fewer),
             more="  ",
         )
-    lines += _modes(found.setup)
+    lines += [f"operation mode: {text}" for text in _modes(found.setup)]
     if not found.complete:
         lines.append(
-            "not all sets are listed, there are too many: "
+            "too many sets, not all are listed: "
             + (
-                "no other set as small has the best rank at the samples"
+                "no other set of this size has the best rank at the samples"
                 if found.minimal_complete
-                else "from the smallest sets no leg can be left out, but a smaller set may exist"
+                else "no leg can be omitted from the smallest sets, but a smaller set may exist"
             )
         )
     return "\n".join(lines)
 
 
 def describe_export(found: ExportedCode) -> str:
-    """What the code is of, and where it answers."""
+    """Return the robot, the units and the proved domain of exported code."""
     proof, bounds = found.proof, found.bounds
     rows: Rows = [
         robot_row(proof.robot),
         ("language", found.lang),
         ("motors", ", ".join(proof.motors)),
-        ("joints", f"{len(proof.passive)} passive, {len(proof.fixed)} idle (held)"),
+        ("joints", f"{len(proof.passive)} passive, {len(proof.fixed)} internal (fixed)"),
         ("directions", ", ".join(found.legs) or "none"),
-        ("inverse", "in closed form" if found.closed else "by Newton's method, from nearby motors"),
+        ("inverse", "in closed form" if found.closed else "by Newton's method, from nearby motor positions"),
         (
             "steps",
             [
-                f"{bounds.steps} of Newton's method are enough, and an answer is within {bounds.error:.2g} of",
+                f"{bounds.steps} Newton steps are enough, and a solution is within {bounds.error:.2g} of",
                 "the closure (rad, 1 or characteristic lengths), rounding included, proved",
                 *([f"whether {bounds.more} is checked at run time"] if bounds.others else []),
             ]
             if bounds
-            else "not bounded in all cells: what is not confirmed is undecided",
+            else "not bounded in all cells: unconfirmed solutions are reported as undecided",
         ),
     ]
     rows.append(("units", UNITS))
     for part in proof.parts:
         rows.append(
             (
-                "answers for",
+                "proved domain",
                 [f"{name} {low:.6g} to {high:.6g}" for name, low, high in zip(part.motors, *part.proved, strict=True)]
                 + [f"and in all of {part.in_cells}, {100 * part.volume_fraction:.4g} % of the box"],
             )
@@ -350,24 +349,24 @@ def describe_export(found: ExportedCode) -> str:
     if proof.injective_box is not None:
         rows.append(
             (
-                "way back",
+                "inverse map",
                 [
                     f"{name} {low:.6g} to {high:.6g}"
                     for name, low, high in zip(proof.motors, *proof.injective_box, strict=True)
                 ]
-                + ["no two motor settings in this box give the same platform pose on this branch, proved"],
+                + ["no two motor positions in this box give the same platform pose on this branch, proved"],
             )
         )
     return listing([*rows, ("size", f"{len(found.code.encode()) / 1024:.0f} kB")])
 
 
 def code(found: ExportedCode) -> bytes:
-    """The program itself."""
+    """Return the source code."""
     return found.code.encode()
 
 
 def advice(found: Advice) -> str:
-    """What is seen now, then the smallest sets of measurements that cure it, by kind."""
+    """Return the present verdict, then the smallest sets of further measurements, by kind."""
     now = found.now
     rows = [
         *head(found.setup),
@@ -380,8 +379,8 @@ def advice(found: Advice) -> str:
 
 def _missing(found: Advice) -> list[str]:
     if found.nothing_missing:
-        return ["Nothing is missing" if found.now.dof else NO_FREEDOM.capitalize()]
-    limits = [] if found.cured else ["No set of legs, links, lines and encoders sees more"]
+        return ["No measurement is missing" if found.now.dof else NO_FREEDOM.capitalize()]
+    limits = [] if found.cured else ["No set of legs, links, lines and encoders has a higher rank"]
     if not found.complete:
         limits = [f"Not every set was tried or decided: {found.tried} tried, {found.undecided} undecided"]
     if not found.sets:
@@ -393,7 +392,7 @@ def _missing(found: Advice) -> list[str]:
     gap = min(each.verdict.gap for each in found.sets)
     what = "one more measurement" if found.size == 1 else f"{found.size} more measurements"
     if any(each.cost != len(each.measurements) for each in found.sets):
-        what = f"further measurements at a price of {found.sets[0].cost:g}"
+        what = f"further measurements at a cost of {found.sets[0].cost:g}"
     ways = "one way" if len(found.sets) == 1 else f"{len(found.sets)} ways"
     lines = [
         f"{best.verdict.capitalize()} (rank {best.rank} of {best.dof}) with {what}, {ways}, smallest rank gap "
@@ -416,14 +415,14 @@ def _missing(found: Advice) -> list[str]:
 
 
 def _singular(found: Advice) -> list[str]:
-    """The sets with which the zero configuration shows fewer freedoms than others do."""
+    """List the sets with a lower rank at the zero configuration."""
     fewer = [[m.name for m in each.measurements] for each in found.sets if each.verdict.rank_at_zero is not None]
     if not fewer:
         return []
     which = "all of these" if len(fewer) == len(found.sets) else f"{len(fewer)} of these"
     more = "" if len(fewer) <= _SHOWN else f"  and {len(fewer) - _SHOWN} more (rank_at_zero with --json)"
-    sensor = "sees fewer freedoms" if len(fewer) == 1 else "see fewer freedoms"
-    title = f"{which} {sensor} at the zero configuration, a Type 2 singularity with them:"
+    verb = "has" if len(fewer) == 1 else "have"
+    title = f"{which} {verb} a lower rank at the zero configuration, a Type 2 singularity with them:"
     return (
         [title]
         if len(fewer) == len(found.sets)
@@ -432,7 +431,7 @@ def _singular(found: Advice) -> list[str]:
 
 
 def _options_that_ask(found: Advice) -> list[str]:
-    """The options of other commands that ask with the first set that has such, and cures at zero too where one does."""
+    """Return the options for other commands, of the first set that they accept, a regular zero configuration first."""
     if not all(each.by_segment for each in found.setup.observed):
         return []
     for each in sorted(found.sets, key=lambda each: each.verdict.rank_at_zero is not None):
@@ -448,7 +447,7 @@ def _options_that_ask(found: Advice) -> list[str]:
 
 
 def _ways(kinds: tuple[str, ...], found: Sequence[tuple[FurtherMeasurement, ...]]) -> list[str]:
-    """The sets of the same kinds in a few words: any so many of each kind where all choices do, else one by one."""
+    """Describe the sets of the same kinds: "any 2 of" if all choices are sets, else one by one."""
     counts = {kind: kinds.count(kind) for kind in kinds}
     names = {kind: list(dict.fromkeys(m.name for each in found for m in each if m.kind == kind)) for kind in counts}
     if len(found) == prod(comb(len(names[kind]), count) for kind, count in counts.items()):
@@ -467,7 +466,7 @@ def _ways(kinds: tuple[str, ...], found: Sequence[tuple[FurtherMeasurement, ...]
 
 
 def view(found: View) -> str:
-    """What is drawn, how far the sliders go, and the page."""
+    """Return what is drawn, the ranges of the sliders, and the notes."""
     sliders = []
     for slider in found.sliders:
         low, high = slider.values[0], slider.values[-1]

@@ -1,4 +1,4 @@
-"""The servo loop in text: a run, the errors that directions lead to, the legs to watch for a displacement."""
+"""The servo loop in text: runs, basins, accuracy, selection of legs."""
 
 from __future__ import annotations
 
@@ -42,19 +42,19 @@ if TYPE_CHECKING:
     from ...simulation.result import Servo
 
 PARTS_FROM_LINEAR = 0.1
-"""Relative difference from which samples are said to part from the linear law."""
+"""Relative difference above which samples contradict the linear law."""
 NEAR_SINGULARITY = 0.1
-"""Part of its value at the pose below which a smallest singular value is said to be near zero."""
+"""Fraction of its value at the pose below which a smallest singular value indicates a singularity."""
 
 
 def servo(found: Servo) -> str:
-    """What was asked, where the run ended and why, what it passed, and how far noise kept it away."""
+    """Return start and goal, the outcome with its reason, the noise, and the crossings."""
     from ...simulation.crossings import CONSTRAINT, LIMIT, TYPE_1, TYPE_2
 
     passed = {
         TYPE_2: "crosses a Type 2 singularity of the hidden robot",
-        TYPE_1: "a watched leg passes its limit (Type 1) into another working mode",
-        LIMIT: "a leg that is not watched passes its limit",
+        TYPE_1: "an observed leg passes a Type 1 singularity into another working mode",
+        LIMIT: "an unobserved leg passes a Type 1 singularity",
         CONSTRAINT: "crosses a constraint singularity of the loops",
     }
     run, track, off = found.run, found.track, found.from_goal
@@ -64,28 +64,28 @@ def servo(found: Servo) -> str:
         ("to", str(found.goal)),
         (
             "controller",
-            f"gain {found.gain:g} per second, sensed: {found.sense}"
+            f"gain {found.gain:g} per second, sensor: {found.sense}"
             + ("" if found.depth == "exact" else f", depth: {found.depth}")
             + ("" if found.noise is None else f", noise {found.noise}"),
         ),
         *dropped_limits(found.setup),
         *GAP,
-        ("ended", [f"{found.outcome} after {run.times[-1]:.3g} s", found.run_outcome.reason]),
+        ("outcome", [f"{found.outcome} after {run.times[-1]:.3g} s", found.run_outcome.reason]),
         ("at", str(found.pose)),
         *joint_rows(found.coordinates),
     ]
     if found.outcome != "goal":
-        rows.append(("", f"{1e3 * off[0]:.4g} mm and {_degrees(off[1])} degrees from the goal"))
+        rows.append(("", f"{1e3 * off[0]:.4g} mm and {_degrees(off[1])} deg from the goal"))
     if found.run_outcome.modes is not None:
         rows.append(
             (
-                "modes",
+                "assembly modes",
                 [
                     *(
                         f"{i}: {mode.pose}" + ("   (the goal)" if mode.goal else "")
                         for i, mode in enumerate(found.run_outcome.modes.modes, 1)
                     ),
-                    "numbered as modes --at the goal lists them",
+                    "numbered as in modes --at with the goal",
                 ],
             )
         )
@@ -94,23 +94,21 @@ def servo(found: Servo) -> str:
         rows.append(
             (
                 "noise",
-                f"in this run it stayed within {1e3 * s.metres:.3g} mm and {_degrees(s.radians)} "
-                f"degrees of there, root mean square {1e3 * s.rms_metres:.2g} mm and "
-                f"{_degrees(s.rms_radians)} degrees",
+                f"within {1e3 * s.metres:.3g} mm and {_degrees(s.radians)} deg of this pose in this run, "
+                f"root mean square {1e3 * s.rms_metres:.2g} mm and {_degrees(s.rms_radians)} deg",
             )
         )
         if s.aside:
             rows.append(
                 (
                     "",
-                    f"keeps it away: on average {1e3 * s.offset:.3g} mm from there, at "
-                    f"({' '.join(f'{value:.4g}' for value in s.mean)})",
+                    f"mean offset {1e3 * s.offset:.3g} mm, at ({' '.join(f'{value:.4g}' for value in s.mean)})",
                 )
             )
     rows.append(("notes" if found.spread is None and found.notes else "", list(found.notes)))
     smallest, at, _ = track.timed(run.times)
     if smallest is not None:
-        rows.append(("on the way", f"smallest singular value of Mᵀ {smallest:.3g}, at {at:.3g} s"))
+        rows.append(("along the run", f"smallest singular value of Mᵀ {smallest:.3g}, at {at:.3g} s"))
     rows += [
         (
             "",
@@ -124,7 +122,7 @@ def servo(found: Servo) -> str:
         rows.append(
             (
                 "",
-                "a Type 2 singularity met and left again on the same side"
+                "a Type 2 singularity reached and left on the same side"
                 if met
                 else "no singularity of the hidden robot crossed",
             )
@@ -133,7 +131,7 @@ def servo(found: Servo) -> str:
 
 
 def basins(found: Basins) -> str:
-    """The goal, the starts, where they end and how many each, and how that was found."""
+    """Return the goal, the starts, the outcomes with their shares, and the method."""
     from ...simulation.equilibria.basins import LETTERS, hindrances
 
     size = " × ".join(f"{count} {name}" for count, name in zip(found.grid.shape, found.grid.names, strict=True))
@@ -142,7 +140,7 @@ def basins(found: Basins) -> str:
         *camera(found.setup),
         ("to", str(found.goal)),
         ("starts", f"{found.starts:,} of {size}: {replace(found.grid, fixed=Pose())}"),
-        *known_row("held", describe_held(found.grid, found.setup, found.batched)),
+        *known_row("fixed", describe_held(found.grid, found.setup, found.batched)),
         *GAP,
     ]
     lines = [
@@ -156,9 +154,9 @@ def basins(found: Basins) -> str:
         ]
         for letter, each in zip(LETTERS, found.ends, strict=False)
     ]
-    rows.append(("ends", table(lines, ("", "ended", "starts", "share", "at", "from, for example")).splitlines()))
+    rows.append(("outcomes", table(lines, ("", "outcome", "starts", "share", "at", "example start")).splitlines()))
     rows += [
-        ("why" if number == 0 else "", f"{letter}: {each.run_outcome.reason}")
+        ("reasons" if number == 0 else "", f"{letter}: {each.run_outcome.reason}")
         for number, (letter, each) in enumerate(zip(LETTERS, found.ends, strict=False))
     ]
     notes = []
@@ -170,18 +168,17 @@ def basins(found: Basins) -> str:
             f"{found.agreed} ended at the same pose"
         )
     if found.batched and found.followed:
-        notes.append(f"{found.followed} runs could not be followed this way and were simulated separately")
+        notes.append(f"{found.followed} runs could not be integrated this way and were simulated separately")
     if count := int(np.sum(found.damped)):
         notes.append(
-            f"{count:,} runs ({100 * count / found.starts:.2g} %) come to a singularity on the way, where "
-            "noise may lead them elsewhere"
+            f"{count:,} runs ({100 * count / found.starts:.2g} %) reach a singularity, where noise decides the outcome"
         )
-    rows.append(("found", notes))
+    rows.append(("method", notes))
     if found.certified is not None:
         drawn = found.certified.length and not found.certified.aside
-        part = f": {100 * found.covered:.2g} % of its basin, as far as that is drawn" if drawn else ""
+        part = f": {100 * found.covered:.2g} % of the part of its basin that is drawn" if drawn else ""
         farther = found.certified.undamped_words
-        rows.append(("certified", [f"{found.certified.words}{part}", *([farther] if farther else [])]))
+        rows.append(("proved radius", [f"{found.certified.words}{part}", *([farther] if farther else [])]))
     return listing(rows)
 
 
@@ -190,7 +187,7 @@ def _degrees(angle: float) -> str:
 
 
 def accuracy(found: Accuracy) -> str:
-    """The cones, the range of errors over a grid, a block for each single pose."""
+    """Return the measurement bounds, the range of errors over a grid, a block for each single pose."""
     name, _ = head(found.setup)
     rows = [
         name,
@@ -213,20 +210,20 @@ def accuracy(found: Accuracy) -> str:
             ("pose", str(errors.pose)),
             *joint_rows(errors.coordinates, errors.beyond_limits),
             *_extent("position", errors.position, 1e3, "mm", length),
-            *_extent("orientation", errors.orientation, 180 / np.pi, "degrees"),
+            *_extent("orientation", errors.orientation, 180 / np.pi, "deg"),
             *([] if true is None else _samples(errors, true)),
         ]
     return listing(rows)
 
 
 def _limits_left(found: Accuracy) -> Rows:
-    """Whose limits a grid passes over."""
+    """Return the row of joint limits that a grid does not check."""
     limited = ", ".join(found.setup.mechanism.stops)
     return [("limits", f"those of {limited} are not checked")] if limited else []
 
 
 def field_rows(found: Accuracy) -> Rows:
-    """What a grid holds: its size, what is reached of it, the range of the errors, how they were checked."""
+    """Return the rows of a grid: size, reached poses, range of the errors, check."""
     field, length = found.field, found.setup.all_samples.model.length
     assert field is not None
     ranges = [
@@ -234,39 +231,39 @@ def field_rows(found: Accuracy) -> Rows:
         ErrorRange.of(field.orientation, LARGEST_FIRST_ORDER),
     ]
     position = _range(ranges[0], field.position, 1e3, "mm")
-    orientation = _range(ranges[1], field.orientation, 180 / np.pi, "degrees")
+    orientation = _range(ranges[1], field.orientation, 180 / np.pi, "deg")
     reached = f"{np.sum(field.reached)} of {field.reached.size}"
     reached += f"; {field.dependent}" if field.dependent else ""
     return _grid_rows(found, field.grid, reached, position, orientation, field.spots, field.gap)
 
 
 def _swept_rows(found: Accuracy, swept: SweptErrors) -> Rows:
-    """The same of a grid that is in a file, of which no median is known."""
+    """Return the rows of a grid that is in a file, without medians."""
     tally = swept.tally
     reached = f"{tally.reached} of {swept.grid.size}" + (
-        f" ({swept.before} were there from an interrupted sweep)" if swept.before else ""
+        f" ({swept.before} from an interrupted sweep)" if swept.before else ""
     )
     return _grid_rows(
         found,
         swept.grid,
         reached,
         _range(tally.position, None, 1e3, "mm"),
-        _range(tally.orientation, None, 180 / np.pi, "degrees"),
+        _range(tally.orientation, None, 180 / np.pi, "deg"),
         swept.spots,
         tally.gap,
     )
 
 
 def describe_held(grid: Grid, setup: ObservedRobot, as_at_home: bool) -> str | None:
-    """What a grid holds: the whole pose but for what varies, where free parts stay as they are at the zero
-    configuration (``as_at_home``), else what was given and which parts are free."""
+    """Describe the fixed coordinates of a grid: all that do not vary if free ones keep their values at the zero
+    configuration (``as_at_home``), else those given and the names of the free ones."""
     motion, typed = setup.motion, str(grid.fixed)
     if not as_at_home:
         free = ", ".join(motion.free({*grid.names, *grid.fixed.given}))
         return (
             (typed or None)
             if not free
-            else (f"{typed or 'nothing'}; free, at each pose nearest to the zero configuration: {free}")
+            else (f"{typed or 'nothing'}; free, chosen nearest to the zero configuration: {free}")
         )
     ends, _ = poses_over(motion, grid, setup.robot.name, grid.places_at(np.array([0, grid.size - 1])))
     first, last = (dict(part.split("=") for part in str(motion.pose(X)).split(",")) for X in ends)
@@ -292,7 +289,7 @@ def _grid_rows(
     )
     rows = [
         ("poses", f"{size}: {ranges}"),
-        *known_row("held", describe_held(grid, found.setup, spots is not None)),
+        *known_row("fixed", describe_held(grid, found.setup, spots is not None)),
         ("reached", reached),
         ("position", position),
         ("orientation", orientation),
@@ -305,7 +302,7 @@ def _grid_rows(
 
 
 def _bounds(blur: MeasurementBounds, where: str, gap: float) -> list[str]:
-    """How much too large errors may be, if they are bounds."""
+    """Return a note on bounds that may be too large."""
     return (
         [f"three {blur.each}s or more: upper bounds, {where} more than {_percent(gap)} % too large"]
         if (gap > SAME_RELATION)
@@ -315,54 +312,53 @@ def _bounds(blur: MeasurementBounds, where: str, gap: float) -> list[str]:
 
 def _range(found: ErrorRange, errors: Array | None, unit: float, word: str) -> str:
     if not found.moves:
-        return "no errors: the platform does not move so"
+        return "no error: the platform has no such motion"
     text = []
     if found.least is not None and found.largest is not None:
         text.append(f"{unit * found.least:.4g} to {unit * found.largest:.4g} {word}")
         if errors is not None:
             text[0] += f", median {unit * np.median(errors[errors <= found.largest]):.4g}"
     text += [f"{NOT_BOUNDED} at {found.slack} poses"] * (found.slack > 0)
-    return "; ".join([*text, *[f"infinite at {found.infinite} poses, where a freedom is lost"] * (found.infinite > 0)])
+    return "; ".join(
+        [*text, *[f"infinite at {found.infinite} poses, where a dof is unobserved"] * (found.infinite > 0)]
+    )
 
 
 def _samples(errors: PoseErrors, true: NonlinearCheck) -> Rows:
     met = (
-        f"smallest singular value of Mᵀ met {true.smallest_singular_value:.3g}"
+        f"smallest singular value of Mᵀ {true.smallest_singular_value:.3g}"
         if np.isfinite(true.smallest_singular_value)
-        else "Mᵀ is not met"
+        else "no Mᵀ"
     )
     if np.isfinite(true.usual):
         near = not true.smallest_singular_value >= max(NEAR_SINGULARITY * true.usual, DAMPED)
-        met += f", at the pose {true.usual:.3g}" + (": a singularity is near" if near else "")
+        met += f", at the pose {true.usual:.3g}" + (": near a singularity" if near else "")
     else:
-        met += "; at the pose there is no Mᵀ: observed links move while the platform rests"
+        met += "; no Mᵀ at the pose: observed links move while the platform is fixed"
     lines = [
-        f"{true.count} true errors give up to {1e3 * true.position:.4g} mm, {np.degrees(true.orientation):.4g} degrees",
+        f"{true.count} error samples give up to {1e3 * true.position:.4g} mm, {np.degrees(true.orientation):.4g} deg",
         met,
     ]
     if true.ended:
         lines.append(
-            f"for {len(true.ended)} of them the best fit becomes flat on the way, first at "
-            f"{true.ended[0]:.2g} of the error: a controller slips away there, farther than computed"
+            f"for {len(true.ended)} of them the least-squares minimum disappears, first at {true.ended[0]:.2g} of the "
+            "error: a controller leaves it there, by more than computed"
         )
     if true.not_found:
-        lines.append(
-            f"{true.not_found} of them were not followed to the end: the solver gave up, which says nothing "
-            "of the robot"
-        )
+        lines.append(f"{true.not_found} of them were not tracked to the end, as the solver stopped")
     whole = not true.not_found
     if _apart(true.position, errors.position, whole) or _apart(true.orientation, errors.orientation, whole):
-        lines.append("they differ from the maxima above, which are unreliable here")
+        lines.append("they contradict the maxima above, which are unreliable here")
     return [("samples", lines)]
 
 
 def _extent(name: str, extent: ErrorEllipsoid, unit: float, word: str, length: float = 1.0) -> Rows:
     if not np.isfinite(extent.largest):
-        return [(name, "infinite: a freedom is lost here")]
+        return [(name, "infinite: a dof is unobserved here")]
     if not is_bounded(extent.largest, length):
-        return [(name, f"{NOT_BOUNDED}: the cones are too large for that here, or a singularity is near")]
+        return [(name, f"{NOT_BOUNDED}: the cones are too large here, or a singularity is near")]
     if extent.direction is None:
-        return [(name, "no error: the platform does not move so")]
+        return [(name, "no error: the platform has no such motion")]
     lines = [f"{unit * extent.largest:.4g} {word}, along {_vector(extent.direction)}"]
     if extent.gap > SAME_RELATION:
         lines.append(f"an upper bound, at most {_percent(extent.gap)} % too large")
@@ -375,14 +371,14 @@ def _extent(name: str, extent: ErrorEllipsoid, unit: float, word: str, length: f
 
 
 def _percent(gap: float) -> str:
-    """So many per cent with two digits, rounded up."""
+    """Format a fraction as per cent with two digits, rounded up."""
     step = 10.0 ** (math.floor(math.log10(100 * gap)) - 1)
     return f"{math.ceil(100 * gap / step) * step:.2g}"
 
 
 def _apart(true: float, linear: ErrorEllipsoid, whole: bool) -> bool:
-    """Whether the largest true error shows that the linear one is unreliable; a smaller one does not unless the samples
-    were followed to the ``whole`` of their errors."""
+    """Return True if the largest sampled error contradicts the linear one; a smaller one does so only if the samples
+    were tracked to the ``whole`` of their errors."""
     apart = true - linear.largest if not whole else abs(true - linear.largest)
     return np.isfinite(linear.largest) and apart > PARTS_FROM_LINEAR * max(linear.largest, 1e-12)
 
@@ -392,7 +388,7 @@ def _vector(vector: Array) -> str:
 
 
 def selection(found: Selection) -> str:
-    """The displacement, the table, the reasons."""
+    """Return the displacement, the table of sets, the reasons for discarded ones."""
     observed, sight, blur = found.setup.observed, found.visible_from is not None, found.bounds
     length = found.setup.all_samples.model.length
     cones = dict.fromkeys(f"{np.degrees(cone):.4g}°" for cone in blur.cones)
@@ -424,21 +420,21 @@ def selection(found: Selection) -> str:
         heads = [
             "legs" if blur.noise is None else "observed",
             "others",
-            "certified",
+            "proved",
             "mm",
-            "degrees",
+            "deg",
             "modes",
             "aspect",
-            *(["seen"] if sight else []),
+            *(["visible"] if sight else []),
             "run",
         ]
         blocks.append(table([_row(each, sight, length) for each in found.kept], heads))
         blocks.append(
-            "others: poses besides the goal that were found to attract the loop; certified: how far\n"
-            "around the goal runs in its working mode are certified to end at it; mm, degrees:\n"
-            "largest errors at the goal; modes: those of the start / of the goal, in brackets those\n"
-            "that the robot was found to reach; – not computed. Best first: by others, by certified\n"
-            "(alike within a power of two), by mm"
+            "others: stable equilibria found besides the goal; proved: radius around the goal within\n"
+            "which runs in its working mode are proved to end at it; mm, deg: largest errors at the\n"
+            "goal; modes: assembly modes at start / goal, in brackets those at which the robot was\n"
+            "found assembled; – not computed. Best first: by others, by proved radius (equal within\n"
+            "a power of two), by mm"
         )
         radii = [
             each.equilibria.radius
@@ -460,13 +456,13 @@ def selection(found: Selection) -> str:
         blocks.append(
             table(
                 [[_row(each, sight, length)[i] for i in (0, 3, 4)] for each in found.unexamined],
-                ["not examined", "mm", "degrees"],
+                ["not examined", "mm", "deg"],
             )
         )
     discarded = [each for each in found.candidates if each.discarded is not None]
     if discarded:
         blocks.append(
-            table([(", ".join(each.legs), str(each.discarded)) for each in discarded], ("discarded", "because"))
+            table([(", ".join(each.legs), str(each.discarded)) for each in discarded], ("discarded", "reason"))
         )
     return "\n\n".join(blocks)
 
@@ -489,7 +485,7 @@ def _row(each: Candidate, sight: bool, length: float) -> list[str]:
 
 
 def _ends(ends: LoopEnds | None) -> list[str]:
-    """How many poses attract besides the goal, and the certified radius."""
+    """Return the number of other stable equilibria, and the proved attraction radius."""
     if ends is None or ends.others is None:
         return ["–", "–"]
     if ends.radius is None or not ends.length:

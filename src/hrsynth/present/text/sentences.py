@@ -1,5 +1,5 @@
-"""The plain answer in sentences, for the studio, the report and the catalog's pages: which legs to watch, what they
-show, where that is lost, how wrong the platform can be, where else the loop may stop."""
+"""Summary in sentences for the studio, the report and the pages of the catalog: legs to observe, rank, singularities,
+error of the platform, other poses at which the loop may stop."""
 
 from __future__ import annotations
 
@@ -21,119 +21,118 @@ from .poses import all_of
 from .tables import name_all
 
 MOST_SETS = 4
-"""Smallest sets that are told."""
+"""Largest number of smallest sets that are listed."""
 
 
 def which(verdict: Verdict) -> str:
-    """Which legs to watch."""
+    """Name the legs to observe."""
     legs = name_all("leg", verdict.legs)
     if verdict == CONTROLLABLE:
-        return f"Watch {legs}."
+        return f"Observe {legs}."
     if not verdict.dof:
-        return "The platform has no freedom: there is nothing to control."
+        return "The platform cannot move: there is nothing to control."
     if not verdict.rank:
-        return (
-            "Watching the legs does not help: their directions do not change with the platform wherever it was tried."
-        )
+        return "Observing the legs is useless: their directions do not change with the platform at any sample."
     lost = len(verdict.unobserved)
     return (
-        f"Watching legs is not enough: even with all of them {lost} of {verdict.dof} freedoms "
-        f"stay{'s' * (lost == 1)} unseen wherever it was tried: {verdict.named}."
+        f"Observing legs is not enough: even with all of them {lost} of {verdict.dof} dof "
+        f"{'is' if lost == 1 else 'are'} unobserved at all samples: {verdict.named}."
     )
 
 
 def blind(verdict: Verdict) -> list[str]:
-    """What follows where a freedom is not seen."""
+    """Describe what to do if a dof is unobserved."""
     if not verdict.dof:
         return []
     legs = name_all("leg", verdict.legs)
-    seen = f"{legs[0].upper()}{legs[1:]} see{'s' * (len(verdict.legs) == 1)} as much as all of them together."
+    seen = f"{legs[0].upper()}{legs[1:]} show{'s' * (len(verdict.legs) == 1)} as many dof as all legs together."
     return [
-        seen if verdict.rank else "However well the directions are measured, they say nothing about the platform.",
-        "Something else must be measured as well: the command advise lists what would do.",
+        seen if verdict.rank else "However accurate the directions are, they do not depend on the platform.",
+        "Another sensor is needed: the command advise lists suggestions.",
     ]
 
 
 def describe_seen(verdict: Verdict, labels: Sequence[str], setup: ObservedRobot) -> str:
-    """How many freedoms are seen, and what is not."""
+    """Describe the observed and the unobserved dof."""
     if (bodies := verdict.formation) is not None:
         rest = "".join(f"; {each.name}" for each in bodies.flexes) or "; nothing else"
         return (
-            f"Watching {_joined(labels, things(setup))} shows {verdict.rank} of the bodies' {verdict.dof} freedoms. "
-            f"Not seen: {', '.join(bodies.trivial) or 'no trivial motion'}{rest}."
+            f"Observing {_joined(labels, things(setup))} shows {verdict.rank} of the {verdict.dof} dof of the links. "
+            f"Unobserved: {', '.join(bodies.trivial) or 'no trivial motion'}{rest}."
         )
     unseen = verdict.named if verdict.unobserved else ""
     return shows(labels, things(setup), verdict.rank, verdict.dof, unseen)
 
 
 def shows(labels: Sequence[str], what: str, rank: int, dof: int, unseen: str = "") -> str:
-    """How many freedoms of a platform ``what`` is observed shows, by labels."""
-    return f"Watching {_joined(labels, what)} shows {rank} of the platform's {dof} freedoms" + (
-        f": not {unseen}." if unseen else "."
+    """Describe the number of platform dof that the observations with these labels show."""
+    return f"Observing {_joined(labels, what)} shows {rank} of {dof} platform dof" + (
+        f"; unobserved: {unseen}." if unseen else "."
     )
 
 
 def fewest(sets: Sequence[Sequence[str]], what: str, rank: int, dof: int) -> str:
-    """Which sets are the smallest that show as much as any."""
+    """List the smallest sets of the best rank."""
     if not rank:
-        return f"No set of {what} shows any of the {dof} freedoms."
+        return f"No set of {what} shows any of the {dof} dof."
     more = len(sets) - MOST_SETS
     told = "; ".join(_joined(each, what) for each in sets[:MOST_SETS]) + (f"; {more} more sets" if more > 0 else "")
-    return f"Fewest {what} that show {rank} of {dof}: {told}."
+    return f"Smallest sets of {what} that show {rank} of {dof} dof: {told}."
 
 
 def where_lost(condition: str) -> str:
-    """Where a freedom is lost."""
-    return f"Where a freedom is lost: {condition}."
+    """State the condition of Type 2 singularities."""
+    return f"Type 2 singularities: {condition}."
 
 
 def home_error(wrong: dict[str, Any]) -> str:
-    """How wrong the platform can be at the zero configuration (:func:`~..view.scale.error`)."""
+    """Describe the error of the platform at the zero configuration (:func:`~..view.scale.error`)."""
     if wrong[wrong["unit"]] is not None:
-        return f"At home the platform is then off by about {wrong['size']} per 0.1°."
+        return f"At the zero configuration, 0.1° of direction error moves the platform by about {wrong['size']}."
     if wrong["words"] == LOST:
-        return "At the zero configuration a freedom is lost, so that the error has no bound there."
-    return f"The error of the platform is then {wrong['words']}."
+        return "The zero configuration is a Type 2 singularity, where the error is unbounded."
+    return f"The error of the platform is {wrong['words']}."
 
 
 def usual_error(found: Accuracy) -> list[str]:
-    """How far the platform may be from where the directions say, over a map; nothing where it is not off at all."""
+    """Describe the median error of the platform over a map; nothing if there is none."""
     field = found.field
     assert field is not None
     said = [
         f"{_median(values):.2g} {unit}"
-        for values, unit in ((1e3 * field.position, "mm"), (np.degrees(field.orientation), "degrees"))
+        for values, unit in ((1e3 * field.position, "mm"), (np.degrees(field.orientation), "deg"))
         if _median(values) > 0
     ]
     what = "Directions" if found.bounds.noise is None else "Measurements"
     words = (
-        f"{what} wrong by {noise_words(found)} put the platform off by up to {' and '.join(said)} "
+        f"{what[:-1]} errors of {noise_words(found)} move the platform by up to {' and '.join(said)} "
         "(median over the map below, to first order)."
     )
     return [words] if said else []
 
 
 def noise_words(found: Accuracy) -> str:
-    """How wrong measurements may be, for the map."""
+    """Format the measurement errors of the map."""
     return (CONE_TEXT if found.bounds.noise is None else str(found.bounds.noise)).replace("deg", "°")
 
 
 def alike(found: AssemblyModes) -> str | None:
-    """How many poses look the same at home, None where these are a continuum or none was found."""
+    """Describe the number of poses that look the same as the zero configuration; None if a family or none was found."""
     if found.found.continuous_family is not None or not found.modes:
         return None
-    far = "; a run that starts far away may end at another than its goal."
+    far = "; a run that starts far away may end at another pose than its goal."
     if found.near_modes:
-        return f"At home {found.alike}{far}"
+        return f"At the zero configuration, {found.alike}{far}"
     count = len(found.modes)
-    words = f"At home {count} pose{'s have' if count > 1 else ' has'} the same {describe_held(found.setup)}"
+    what = f"pose{'s have' if count > 1 else ' has'} the same {describe_held(found.setup)}"
+    words = f"At the zero configuration, {count} {what}"
     return f"{words} ({all_of(found)}){far if count > 1 else '.'}"
 
 
 def elsewhere(found: AssemblyModes) -> str:
-    """Where else the loop may stop: the other assembly modes, as they were listed."""
+    """Describe the other poses at which the loop may stop: the assembly modes that were listed."""
     if found.found.continuous_family is not None or found.self_motions:
-        return "The loop may stop anywhere on a whole curve of poses at which the legs look the same."
+        return "The loop may stop anywhere on a curve of poses at which the legs look the same."
     others: list[AssemblyMode] = [*(mode for mode in found.modes if not mode.goal), *found.near_modes]
     return _others(found, len(others), [mode for mode in others if mode.reachable is not False])
 
@@ -150,23 +149,23 @@ def _others(found: AssemblyModes, count: int, met: list[AssemblyMode]) -> str:
                 if known
                 else ("No other pose was found at which the legs look the same")
             )
-        return f"{words}." if known else f"{words}; there may be others that were not found."
+        return f"{words}." if known else f"{words}; others are not excluded."
     away = sorted(distance_from(found.setup.motion, found.goal, mode) for mode in met)
     near, turn = away[0]
-    far = f"{_length(near)} away" if near > SAME_RELATION else f"turned by {np.degrees(turn):.2g}°"
+    far = f"{_length(near)} away" if near > SAME_RELATION else f"rotated by {np.degrees(turn):.2g}°"
     where = f"one other pose, {far}" if len(met) == 1 else f"{_number(len(met))} other poses, the nearest {far}"
     if found.near_modes:
         where += f" (directions that differ by no more than {degrees(found.near_modes[-1].angle)})"
-    return f"The loop may stop at {where}{'' if known else ', and perhaps at others that were not found'}."
+    return f"The loop may stop at {where}{'' if known else ', others are not excluded'}."
 
 
 def things(setup: ObservedRobot) -> str:
-    """What sets are sets of."""
+    """Return "legs", or "observations" if others than legs are observed."""
     return "legs" if all(o.by_segment for o in setup.observed) else "observations"
 
 
 def describe_held(setup: ObservedRobot) -> str:
-    """What assembly modes have in common."""
+    """Name the fixed values of assembly modes."""
     return "observed directions" if things(setup) == "legs" else "measurements"
 
 

@@ -1,4 +1,4 @@
-"""Columns of text, rows of names with their values, and the rows that most answers begin with."""
+"""Tables, rows of names with values, and the first rows of most outputs."""
 
 from __future__ import annotations
 
@@ -17,31 +17,30 @@ if TYPE_CHECKING:
     from ...mechanism import Mechanism, Observation
 
 Rows = list[tuple[str, str | Sequence[str]]]
-"""Names with their values: several stand under each other, none is no row."""
+"""Names with values: several are printed below each other, none is no row."""
 NOT_BOUNDED = "not bounded to first order"
 GAP: Rows = [("", "")]
 """An empty line."""
 LINE, LEAST = 100, 30
-"""Columns of a table, and of its last column at least: beyond, that one is wrapped."""
+"""Width of a table, and smallest width of its last column, which is wrapped."""
 NAMES = 14
-"""Columns before the values of an answer, at most."""
+"""Width of the column of names, at most."""
 
 
 def csv_bytes(rows: Iterable[Iterable[Any]]) -> bytes:
-    """Rows, their heads first, as comma-separated values."""
+    """Format rows, headers first, as comma-separated values."""
     stream = io.StringIO()
     csv.writer(stream, lineterminator="\n").writerows(rows)
     return stream.getvalue().encode()
 
 
 def width(text: str) -> int:
-    """Columns that ``text`` takes (combining low lines take none)."""
+    """Return the width of ``text`` in columns (combining low lines have none)."""
     return sum(1 for character in text if character != "\u0332")
 
 
 def table(rows: Sequence[Sequence[str]], heads: Sequence[str]) -> str:
-    """Columns set apart by two spaces, a rule under the heads; the last column is not padded, and wrapped where the
-    lines would be too long."""
+    """Format columns separated by two spaces, a rule below the headers, the last column wrapped."""
     before = sum(max(width(row[i]) for row in (heads, *rows)) + 2 for i in range(len(heads) - 1))
     all_samples = [list(heads)]
     for *cells, last in rows:
@@ -57,14 +56,14 @@ def table(rows: Sequence[Sequence[str]], heads: Sequence[str]) -> str:
 
 
 def wrap_lines(text: str, columns: int = LINE, more: str = "") -> list[str]:
-    """The lines of a text, no word, vector or set of it parted; further ones begin with ``more``."""
+    """Wrap a text without breaking words, vectors or sets; further lines begin with ``more``."""
     whole = re.sub(r"\([-+.e\d ]+\)|\{[^}]*\}", lambda found: found[0].replace(" ", "\u00a0"), text)
     lines = textwrap.wrap(whole, columns, subsequent_indent=more, break_long_words=False, break_on_hyphens=False)
     return [line.replace("\u00a0", " ") for line in lines] or [""]
 
 
 def listing(rows: Iterable[tuple[str, str | Sequence[str]]]) -> str:
-    """A line a value, the values under each other, the name before the first."""
+    """Format a line per value, the values below each other, the name before the first."""
     lines = [
         (name if i == 0 else "", value)
         for name, values in rows
@@ -75,51 +74,51 @@ def listing(rows: Iterable[tuple[str, str | Sequence[str]]]) -> str:
 
 
 def list_words(words: Sequence[str]) -> str:
-    """Words as a sentence lists them: one, two and three."""
+    """Join words as in a sentence: one, two and three."""
     return ", ".join(words[:-1]) + " and " * (len(words) > 1) + words[-1]
 
 
 def name_all(noun: str, words: Sequence[str]) -> str:
-    """Things of a kind by their names: leg 1; legs 1, 2 and 4."""
+    """Name several things of a kind: leg 1; legs 1, 2 and 4."""
     return f"{noun}{'s' * (len(words) > 1)} {list_words(words)}"
 
 
 def is_bounded(error: Any, length: float = 1.0) -> Any:
-    """Whether a displacement (m, with a characteristic ``length``) or a turn (rad) is one of which the first order
-    tells anything."""
+    """Return True for a displacement (m, with a characteristic ``length``) or a rotation (rad) that is small enough for
+    the first order."""
     return error <= LARGEST_FIRST_ORDER * length
 
 
 def known_row(name: str, value: str | None) -> Rows:
-    """A row where there is a value."""
+    """Return a row, none if the value is None."""
     return [] if value is None else [(name, value)]
 
 
 def joint_rows(found: FileCoordinates | None, beyond: Sequence[str] = ()) -> Rows:
-    """The coordinates of the motors and of the other joints at a configuration, and those beyond their limits."""
+    """Return the rows of motor and joint coordinates of a configuration, and of those beyond joint limits."""
     rows = [] if found is None else [("motors", found.motors), ("joints", found.joints)]
     told = [(name, ", ".join(f"{joint} {write_value(x)}" for joint, x in each.items())) for name, each in rows if each]
-    return [*told, *known_row("limits", f"beyond those of {', '.join(beyond)}" if beyond else None)]
+    return [*told, *known_row("limits", f"exceeded: {', '.join(beyond)}" if beyond else None)]
 
 
 def write_value(value: float | tuple[float, ...]) -> str:
-    """A joint's coordinate, or its coordinates."""
+    """Format the coordinate or coordinates of a joint."""
     return "/".join(f"{round(x, 9) + 0.0:.6g}" for x in (value if isinstance(value, tuple) else (value,)))
 
 
 def dropped_limits(setup: ObservedRobot) -> Rows:
-    """The joints whose limits are not looked at."""
+    """Return the row of joints whose limits are ignored."""
     joints = ", ".join(setup.limits_ignored)
-    return [("limits", f"those of {joints} are not looked at: they are parts of other joints")] if joints else []
+    return [("limits", f"ignored: {joints}, as they are parts of other joints")] if joints else []
 
 
 def robot_row(robot: Mechanism, words: str = "") -> tuple[str, list[str]]:
-    """The robot, its platform and how that was chosen."""
+    """Return the row of the robot, its platform and how that was chosen."""
     return "robot", [f"{robot.name}   {words}".rstrip(), f"platform: {robot.platform_words}"]
 
 
 def head(found: ObservedRobot) -> Rows:
-    """The robot and what is observed of it."""
+    """Return the rows of the robot and its observations."""
     seen = ", ".join(label_of(each).replace(" ", "\u00a0") for each in found.observed)
     return [
         robot_row(found.robot, str(found.decomposition.architecture())),
@@ -128,12 +127,12 @@ def head(found: ObservedRobot) -> Rows:
 
 
 def label_of(observation: Observation) -> str:
-    """An observation's label, with what it is."""
+    """Return the label of an observation, with its kind."""
     return f"{observation.leg} ({observation.link if observation.by_segment else describe_observation(observation)})"
 
 
 def describe_observation(observation: Observation) -> str:
-    """What is observed, and by what: ``point of plate by hand``."""
+    """Describe an observation: ``point of plate by hand``."""
     told = observation.to_dict()
     if "joint" in told:
         return f"encoder of {told['joint']}"
@@ -146,7 +145,7 @@ def describe_observation(observation: Observation) -> str:
 
 
 def describe_watched(found: ObservedRobot) -> dict[str, list[str]]:
-    """What is watched of each leg: the link, the axis in its frame, and why it is that."""
+    """Return the observed links of each leg with the axis in the link frame, and the reason of the choice."""
     from ...analysis.freedoms import point_text
 
     told: dict[str, list[str]] = {}
@@ -160,11 +159,11 @@ def describe_watched(found: ObservedRobot) -> dict[str, list[str]]:
 
 
 def camera(found: ObservedRobot) -> Rows:
-    """What carries the camera, where it is not the base."""
+    """Return the row of the link that carries the camera, unless it is the base."""
     reference = found.mechanism.reference
     return known_row("camera on", reference if reference != found.mechanism.base else None)
 
 
 def sets(found: Iterable[Iterable[str]]) -> list[str]:
-    """Sets of names in braces."""
+    """Format sets of names in braces."""
     return ["{" + ", ".join(each) + "}" for each in found]

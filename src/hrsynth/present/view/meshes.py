@@ -1,4 +1,4 @@
-"""Visual shapes of a robot's own file, in place of rods: meshes and solids of any dialect, nothing fetched."""
+"""Visual shapes of a robot's own file, in place of rods: meshes and solids of any format, nothing fetched."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The other assembly modes: where else the robot is with the directions of the zero configuration."""
+"""Outlines of the other assembly modes of the zero configuration."""
 
 from __future__ import annotations
 
@@ -20,9 +20,8 @@ from .states import page_values, place
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ModeOutline(Value):
-    """An assembly mode that is not the pose itself: its number as in ``modes``, its pose, whether the robot can be
-    assembled there, as ``AssemblyMode`` says it twice, and the displacement (7,) of each link, None of those whose
-    place is not known."""
+    """Assembly mode other than the given pose: its number as in ``modes``, its pose, whether the robot can be assembled
+    there (``reachable``, ``assembly``), and the displacement (7,) of each link, None if unknown."""
 
     label: Recorded[str]
     pose: Recorded[Pose]
@@ -32,7 +31,7 @@ class ModeOutline(Value):
 
     @property
     def words(self) -> str:
-        """The pose, short, its turn by the name by which it is told elsewhere."""
+        """Format the pose, with its rotation as phi or rpy."""
         told = Pose.parse(str(self.pose))
         x, y, z = (round(value or 0.0, 3) + 0.0 for value in (told.x, told.y, told.z))
         name, angles = ("rpy", told.rpy or (0.0,)) if told.phi is None else ("phi", (told.phi,))
@@ -41,7 +40,7 @@ class ModeOutline(Value):
         return f"x {x:g}, y {y:g}, z {z:g} m{turned}"
 
     def scene(self) -> dict[str, Any]:
-        """What the page is given."""
+        """Return the data for the page."""
         places = [None if each is None else page_values(each[None])[0] for each in self.places]
         return {
             "label": self.label,
@@ -52,21 +51,21 @@ class ModeOutline(Value):
 
 
 def mode_outlines(setup: ObservedRobot) -> tuple[tuple[ModeOutline, ...], tuple[str, ...]]:
-    """All modes but the zero configuration's pose, and why there are none or not all."""
+    """Return all other modes, and notes if there are none or the list is incomplete."""
     try:
         found = modes(setup)
     except HrsynthError as error:
-        return (), (f"assembly modes are not shown: {error}",)
+        return (), (f"assembly modes are not listed: {error}",)
     if found.found.continuous_family is not None:
-        return (), (f"assembly modes are not shown: {found.found.singular_solutions}",)
-    notes = () if found.found.complete else ("perhaps not all assembly modes are shown",)
+        return (), (f"assembly modes are not listed: {found.found.singular_solutions}",)
+    notes = () if found.found.complete else ("more assembly modes may exist than are listed",)
     listed = [(str(number), mode) for number, mode in enumerate(found.modes, 1) if not mode.goal]
     listed += [(f"near {number}", mode) for number, mode in enumerate(found.near_modes, 1)]
     return tuple(outline(setup, *each) for each in listed), notes
 
 
 def outline(setup: ObservedRobot, label: str, mode: AssemblyMode) -> ModeOutline:
-    """An assembly mode with its ``label``."""
+    """Return the outline of an assembly mode with its ``label``."""
 
     def where(link: str) -> Array | None:
         if mode.configuration is not None:

@@ -35,7 +35,7 @@ class Shape(Value):
     """A shape on a link, its ``points`` (n, 3) and half-width ``size`` (m).
 
     ``kind``: rod, rail and span run from the first point to the second, a span from a point of ``link`` to one of
-    ``other``; a plate is the polygon of its points; a ball has one point; a hinge is a cylinder along its axis, a
+    ``other``; a plate is the polygon of its points; a ball has one point; ``hinge`` is a cylinder along its axis, a
     slider a box, a cross has two axes (four points), a disc lies across its axis; a mesh has ``faces`` (m, 3).
     """
 
@@ -49,7 +49,7 @@ class Shape(Value):
     faces: Array | None = None
 
     def scene(self, places: dict[str, int]) -> dict[str, Any]:
-        """What the page is given, links by their ``places``."""
+        """Return the data for the page, links by their ``places``."""
         record: dict[str, Any] = {
             "kind": self.kind,
             "link": places[self.link],
@@ -96,7 +96,7 @@ class Drawer(Value):
         return joint.turned() if joint.successor == self.mechanism.base else joint
 
     def role(self, link: str) -> str:
-        """What a link is."""
+        """Return the role of a link."""
         if link == self.mechanism.base:
             return BASE
         if link in self.platform:
@@ -148,7 +148,7 @@ class Drawer(Value):
             yield made("ball", 0.0, 2.1, ())
 
     def _way(self, joint: Joint, travels: dict[str, tuple[float, float]]) -> Iterator[Shape]:
-        """What a sliding joint slides along: a rail on the base, or what has come out between two moving links."""
+        """Return the rail of a prismatic joint on the base, or the extended part between two moving links."""
         role = VIRTUAL if joint.name not in self.real.joints else LEG
         if joint.name in travels:
             ends = np.array([joint.point + way * joint.axis for way in travels[joint.name]])

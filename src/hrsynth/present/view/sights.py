@@ -1,5 +1,4 @@
-"""What sensors see of a robot at a configuration: each kind of observation draws itself, in space and in the picture of
-its camera; and the cameras."""
+"""Observations of a robot at a configuration, drawn in space and in the image of their camera; and the cameras."""
 
 from __future__ import annotations
 
@@ -19,17 +18,17 @@ from ...results import Value
 from .shapes import PAGE_DIGITS
 
 REACH = 0.3
-"""Half-length of what has none of its own (characteristic lengths)."""
+"""Half-length of observations without an extent (characteristic lengths)."""
 ROOM = 1.5
-"""How much more a picture shows than what is at home in it."""
+"""Size of an image over the extent of the observations at the zero configuration."""
 CASE = 0.15
-"""Depth of the pyramid that is drawn of a camera (characteristic lengths)."""
+"""Depth of the pyramid that represents a camera (characteristic lengths)."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ShownSight(Value):
-    """An observation or (without a picture) a camera as it is drawn: in the base frame, and in the picture of the
-    camera of this number."""
+    """Observation or (without an image) camera as drawn: in the base frame, and in the image of the camera of this
+    number."""
 
     name: str
     drawn: Drawn
@@ -37,7 +36,7 @@ class ShownSight(Value):
     image: tuple[Array, ...] = ()
 
     def scene(self) -> dict[str, Any]:
-        """What the page is given."""
+        """Return the data for the page."""
         rounded = {
             key: [np.round(each, PAGE_DIGITS).tolist() for each in every]
             for key, every in (("lines", self.drawn.lines), ("areas", self.drawn.areas), ("image", self.image))
@@ -46,7 +45,7 @@ class ShownSight(Value):
 
 
 def eyes(setup: ObservedRobot) -> list[NamedCamera]:
-    """The cameras by which something is seen; where none is named, the reference link's frame."""
+    """Return the cameras with an observation; if unnamed, the frame of the reference link."""
     found: dict[str, NamedCamera] = {}
     for seen in setup.observed:
         if isinstance(seen, CameraObservation):
@@ -56,14 +55,15 @@ def eyes(setup: ObservedRobot) -> list[NamedCamera]:
 
 
 def half_picture(camera: NamedCamera) -> Array:
-    """Half the width and the height of a camera's picture at z = 1; of one without a size that of 90°."""
+    """Return half the width and height of a camera's image at z = 1; 90° if it has no size."""
     if camera.focal and camera.width and camera.height:
         return np.array([camera.width, camera.height]) / (2 * camera.focal)
     return np.ones(2)
 
 
 def frames(cameras: Sequence[NamedCamera], home: Sequence[ShownSight]) -> list[Array]:
-    """:func:`half_picture` of each, but of a camera without a size what shows all that it sees at home."""
+    """Return :func:`half_picture` of each camera; one without a size shows all its observations at the zero
+    configuration."""
     found = []
     for number, camera in enumerate(cameras):
         seen = [np.abs(stroke).max() for each in home if each.camera == number for stroke in each.image]
@@ -73,7 +73,7 @@ def frames(cameras: Sequence[NamedCamera], home: Sequence[ShownSight]) -> list[A
 
 
 def shown_sights(setup: ObservedRobot, at: ClosedConfiguration) -> tuple[ShownSight, ...]:
-    """All that is observed but directions, which are arrows on their links, and the cameras."""
+    """Return all observations but directions, which are arrows on their links, and the cameras."""
     found, every, length = [], eyes(setup), setup.mechanism.length
     for seen in setup.observed:
         if isinstance(seen, Direction):
@@ -92,7 +92,7 @@ def shown_sights(setup: ObservedRobot, at: ClosedConfiguration) -> tuple[ShownSi
 
 
 def _case(X: Array, half: Array, depth: float) -> Drawn:
-    """The pyramid of a camera at X (4, 4)."""
+    """Return the pyramid of a camera at X (4, 4)."""
     corners = depth * np.array([[x * half[0], y * half[1], 1] for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
     R, C = X[:3, :3], X[:3, 3]
     corners = corners @ R.T + C

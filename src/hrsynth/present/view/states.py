@@ -1,6 +1,6 @@
-"""Where all links are, at the zero configuration, along each slider, and wherever the platform is sent.
+"""Displacements of all links at the zero configuration, along each slider, and at poses of the platform.
 
-A link's place is its displacement from the zero configuration: position and unit quaternion (x, y, z, w).
+A displacement from the zero configuration is a position and a unit quaternion (x, y, z, w).
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from ...kinematics.pinocchio_model import PinocchioModel
 from ...kinematics.platform_motion import PoseTask
 from ...kinematics.tasks import PoseAndValuesTask, solve, system
 from ...mechanism import Mechanism
-from ...records import Number, Recorded, Shown
+from ...records import As, Number, Recorded, Shown
 from ...results import Value
 from ...tolerances import FOLLOWED, SOLVED
 from .scale import error
@@ -32,18 +32,17 @@ from .sights import ShownSight, shown_sights
 
 REAL, HIDDEN = "real", "hidden"
 TURN, WAY = 1.0, 1.0
-"""How far a slider turns (rad) and moves (characteristic lengths) the platform each way at most."""
+"""Largest rotation (rad) and translation (characteristic lengths) of a slider, in each direction."""
 BEYOND_SLIDERS = 100.0
-"""Such distances beyond which no slider sends the platform."""
+"""Largest displacement that is accepted, in multiples of these."""
 STEPS = 10
-"""Configurations on each side of a slider's home."""
+"""Configurations of a slider on each side of the zero configuration."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ViewState(Value):
-    """The places (links, 7) of each machine's links, the smallest singular value of Mᵀ (characteristic lengths; None
-    where Mᵀ does not exist), how wrong the platform can be there (:func:`.error`), where that was asked, and what
-    sensors see."""
+    """Displacements (links, 7) of each machine's links, smallest singular value of Mᵀ (characteristic lengths; None if
+    Mᵀ does not exist), error of the platform (:func:`.error`) if requested, and observations."""
 
     places: Mapping[str, Array]
     distance: float | None
@@ -51,7 +50,7 @@ class ViewState(Value):
     sights: tuple[ShownSight, ...] = ()
 
     def scene(self) -> dict[str, Any]:
-        """What the page is given."""
+        """Return the data for the page."""
         return {
             **{key: page_values(places) for key, places in self.places.items()},
             "distance": None if self.distance is None else float(f"{self.distance:.5g}"),
@@ -62,19 +61,19 @@ class ViewState(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Slider(Value):
-    """One freedom of the platform: its coordinate's values (n,) in metres or radians, the state at each of them, and
-    which of them is home."""
+    """Slider of one platform coordinate: its values (n,) in metres or radians, the state at each of them, and the index
+    of the zero configuration."""
 
     name: Recorded[str]
     unit: Recorded[str]
     values: Recorded[tuple[float, ...]]
     states: tuple[ViewState, ...]
-    home: Recorded[int]
+    home: Annotated[int, As("zero_configuration"), "index of the value at the zero configuration"]
 
     distances = Shown(list[Number], lambda self: [state.distance for state in self.states])
 
     def scene(self) -> dict[str, Any]:
-        """What the page is given."""
+        """Return the data for the page."""
         values = [round(value, PAGE_DIGITS) for value in self.values]
         return {
             "name": self.name,
@@ -88,7 +87,7 @@ class Slider(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Posed(Value):
-    """A configuration of the real robot and the coordinates (nq,) of the hidden one that goes with it."""
+    """Configuration of the real robot with the coordinates (nq,) of the hidden one."""
 
     real: ClosedConfiguration
     hidden: Array | None = None
@@ -96,7 +95,7 @@ class Posed(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Mover(Value):
-    """The real robot with its platform's coordinates, and the twin of the hidden robot that follows it."""
+    """Real robot with its platform coordinates, and the model of the hidden robot that follows it."""
 
     setup: ObservedRobot
     coordinates: Coordinates
@@ -105,7 +104,7 @@ class Mover(Value):
 
     @classmethod
     def of(cls, setup: ObservedRobot, hidden: Mechanism | None) -> Mover:
-        """At the zero configuration."""
+        """Start at the zero configuration."""
         start = setup.all_samples.start
         model = None if hidden is None else PinocchioModel(hidden, start.model.length)
         coordinates = Coordinates.of(start, setup.all_samples.observation_model, setup.motion)
@@ -113,16 +112,16 @@ class Mover(Value):
 
     @property
     def home(self) -> Posed:
-        """The zero configuration."""
+        """Return the zero configuration."""
         return Posed(self.setup.all_samples.start, None if self.hidden is None else self.hidden.q0)
 
     def state(self, at: Posed) -> ViewState:
-        """What the page shows of a configuration."""
+        """Return what the page shows of a configuration."""
         sights = shown_sights(self.setup, at.real)
         return ViewState(self.places(at), self.examiner.classify(at.real).distances.type2, sights=sights)
 
     def places(self, at: Posed) -> dict[str, Array]:
-        """The places (links, 7) of each machine's links."""
+        """Return the displacements (links, 7) of each machine's links."""
         places = {REAL: displacements(self.setup.mechanism, at.real.pose)}
         if self.hidden is not None and at.hidden is not None:
             q = at.hidden
@@ -130,11 +129,11 @@ class Mover(Value):
         return places
 
     def with_error(self, at: Posed) -> ViewState:
-        """The same with the error there."""
+        """Return the state with the error of the platform."""
         return replace(self.state(at), error=error(self.setup, at.real))
 
     def send(self, here: Posed, values: Array) -> tuple[Posed, Array]:
-        """Where the robot comes to from ``here`` when the platform is sent to coordinates (n,), and those there."""
+        """Track the robot from ``here`` to platform coordinates (n,); return where it arrives, and the coordinates."""
         aim = Coordinates(self.setup.motion, self.coordinates.places, values)
         there, _ = track(here.real, self.setup.motion, aim)
         followed = self.follow_hidden(here, [there])
@@ -142,8 +141,8 @@ class Mover(Value):
         return found, values + aim.apart(found.real.pose(self.setup.motion.link))
 
     def draw_to(self, here: Posed, X: Array) -> Posed:
-        """Where the robot comes to from ``here`` when its platform is drawn to the pose X (4, 4): as near as it goes,
-        lengths in characteristic lengths, turns in radians."""
+        """Move the platform from ``here`` as near as possible to the pose X (4, 4), lengths in characteristic lengths,
+        rotations in radians."""
         motion = self.setup.motion
         whole = PoseTask(
             motion.link,
@@ -158,17 +157,16 @@ class Mover(Value):
         return followed[-1] if followed else here
 
     def read(self, posed: Posed) -> Array:
-        """The coordinates (n,) of the platform."""
+        """Return the coordinates (n,) of the platform."""
         return self.coordinates.read(posed.real.pose(self.setup.motion.link))
 
     def beside(self, at: ClosedConfiguration, q: Array) -> Posed | None:
-        """The real robot with the hidden one at ``q``, None if that is at another pose or its directions at others."""
+        """Return the real robot with the hidden one at ``q``, None if pose or directions differ."""
         assert self.hidden is not None
         return Posed(at, q) if np.linalg.norm(self._misses(at, q)) <= FOLLOWED else None
 
     def with_hidden(self, at: ClosedConfiguration) -> Posed:
-        """The real robot with the hidden one beside it, which comes there from its zero configuration; without it where
-        it does not arrive."""
+        """Return the real robot with the hidden one, tracked from its zero configuration; without it if that fails."""
         found = self.follow_hidden(self.home, [at])
         if not found:
             goal = Coordinates(
@@ -181,7 +179,7 @@ class Mover(Value):
 
     @cached_property
     def ends(self) -> tuple[tuple[Posed, Posed], ...]:
-        """Where each coordinate alone comes to, down and up, as far as small steps lead within its slider's span."""
+        """Return the lower and upper end of each slider, tracked within its span."""
         found = []
         for index, place in enumerate(self.coordinates.places):
             span = TURN if place >= 3 else WAY * self.home.real.model.length
@@ -190,12 +188,12 @@ class Mover(Value):
         return tuple(found)
 
     def far(self, values: Array) -> bool:
-        """Whether coordinates (n,) are so far from home that no slider means them."""
+        """Return True if coordinates (n,) are far beyond all sliders."""
         spans = np.where(np.array(self.coordinates.places) >= 3, TURN, WAY * self.home.real.model.length)
         return bool(np.any(np.abs(values - self.coordinates.values) > BEYOND_SLIDERS * spans))
 
     def sliders(self) -> tuple[Slider, ...]:
-        """Each coordinate alone changed from home, as far as the robot, and the hidden one with it, goes."""
+        """Return the sliders, each over the range in which the robot and the hidden one can be tracked."""
         return tuple(self._slider(index) for index in range(len(self.coordinates.places)))
 
     def _slider(self, index: int) -> Slider:
@@ -216,7 +214,7 @@ class Mover(Value):
         )
 
     def follow_hidden(self, start: Posed, way: Iterable[ClosedConfiguration]) -> list[Posed]:
-        """The way with the hidden robot beside the real one, as far as it can follow."""
+        """Track the hidden robot along a path of the real one, as far as it can follow."""
         found: list[Posed] = []
         q = start.hidden
         for at in way:
@@ -228,12 +226,12 @@ class Mover(Value):
         return found
 
     def _misses(self, at: ClosedConfiguration, q: Array) -> Array:
-        """What the hidden robot misses at ``q``: its loops, the pose and the directions."""
+        """Return the residuals of the hidden robot at ``q``: loops, pose and directions."""
         assert self.hidden is not None
         return system(self.hidden, q, self._target(at))[0]
 
     def _target(self, at: ClosedConfiguration) -> PoseAndValuesTask:
-        """The pose and the directions that the hidden robot takes over; blind links are not in it."""
+        """Return the pose and the directions that the hidden robot has; constant-direction legs are not in it."""
         target = self.setup.samples.observation_model.target(at)
         assert self.hidden is not None
         links = self.hidden.mechanism.links
@@ -247,17 +245,17 @@ class Mover(Value):
 
 
 def displacements(mechanism: Mechanism, pose: Any) -> Array:
-    """The displacement of each link from the zero configuration, (links, 7); ``pose`` gives X_BL (4, 4) of a link."""
+    """Return the displacement of each link from the zero configuration, (links, 7); ``pose`` gives X_BL (4, 4)."""
     return np.array([place(pose(name) @ inverse(link.pose)) for name, link in mechanism.links.items()])
 
 
 def place(X: Array) -> Array:
-    """Position and unit quaternion (x, y, z, w) of a pose X (4, 4), (7,)."""
+    """Return position and unit quaternion (x, y, z, w) of a pose X (4, 4), (7,)."""
     from scipy.spatial.transform import Rotation
 
     return np.concatenate([X[:3, 3], Rotation.from_matrix(X[:3, :3]).as_quat(canonical=True)])
 
 
 def page_values(places: Array) -> list[list[float]]:
-    """Places (links, 7) with the digits that the page is given."""
+    """Round displacements (links, 7) for the page."""
     return (np.round(places, PAGE_DIGITS) + 0.0).tolist()

@@ -1,4 +1,4 @@
-"""What the 3D view of a robot shows: its links and joints, its hidden robot, sliders, directions, assembly modes."""
+"""3D view of a robot: its links and joints, its hidden robot, sliders, directions, assembly modes."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ ARROW = (0.35, 0.7)
 """Length of an arrow at least and at most (characteristic lengths); between these, a part ``SHARE`` of its link's."""
 SHARE = 0.55
 MARGIN = 4.0
-"""What a rail is longer than the way of its slider, at each end (radii of rods)."""
+"""Margin of a rail at each end (radii of rods)."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Machine(Value):
-    """A robot that is drawn: ``key`` real or hidden, what it is called, its links in order, its shapes, the base's
+    """Robot that is drawn: ``key`` real or hidden, its label, its links in order, its shapes, the base's
     and the platform's frame (7,) at the zero configuration, and of each link the real robot's leg that holds it."""
 
     key: str
@@ -52,7 +52,7 @@ class Machine(Value):
     legs: tuple[str | None, ...] = ()
 
     def scene(self) -> dict[str, Any]:
-        """What the page is given."""
+        """Return the data for the page."""
         places = {name: i for i, name in enumerate(self.links)}
         return {
             "key": self.key,
@@ -67,7 +67,7 @@ class Machine(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Arrow(Value):
-    """An observed direction: its leg, its link, and where the arrow runs (2, 3) at the zero configuration."""
+    """Observed direction: its leg, its link, and where the arrow runs (2, 3) at the zero configuration."""
 
     leg: str
     link: str
@@ -76,7 +76,7 @@ class Arrow(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class View(Result, shown_as="view"):
-    """All that the page needs. ``normal`` (3,) is that of the plane in which everything moves, None in space."""
+    """Result of :func:`view`. ``normal`` (3,) is that of the plane in which everything moves, None in space."""
 
     setup: Annotated[ObservedRobot, FLAT]
     derivation: Derivation | None
@@ -90,25 +90,48 @@ class View(Result, shown_as="view"):
     notes: Recorded[tuple[str, ...]]
 
     def headline(self) -> str:
-        """The robot, and how much there is to see of it."""
+        """Return the robot, and the number of sliders and modes."""
         return f"{self.setup.robot.name}, {len(self.sliders)} sliders, {len(self.mode_outlines)} other assembly modes"
 
     @property
     @recorded(As("largest_distance"))
     def largest(self) -> float | None:
-        """The largest of the smallest singular values that are shown: the far end of the scale of colours."""
+        """Largest of the smallest singular values that are shown."""
         found = [state.distance for slider in self.sliders for state in slider.states]
         return max((value for value in found if value is not None), default=self.home.distance)
 
     def save(self, file: str | Path) -> None:
-        """Write the view as one page (.html) that needs neither server nor network; raises ``BadRequest``."""
+        """Write the view as one page (.html) that needs neither server nor network.
+
+        Raises
+        ------
+        BadRequest
+            If the file cannot be written.
+        """
         (each,) = OUTPUTS[self.shown_as].files
         each.require(str(file), {})
         each.writer(self, str(file), {})[0]()
 
     def serve(self, port: int = 0, *, open_: bool = True) -> Any:
-        """Serve the view on this machine, where all sliders move together, and open it in the browser: a server with
-        ``address`` and ``stop()``. Port 0 is any free port. Raises ``BadRequest``."""
+        """Serve the view on this machine, where all sliders move together, and open it in the browser.
+
+        Parameters
+        ----------
+        port
+            Port of the server; 0 for any free port.
+        open_
+            Open the browser.
+
+        Returns
+        -------
+        StudioServer
+            Server with ``address`` and ``stop()``.
+
+        Raises
+        ------
+        BadRequest
+            If the port is not available.
+        """
         return function("studio.server:view_server")(self, port, open_)
 
     dof = Shown(int, lambda self: self.setup.dof)
@@ -116,7 +139,7 @@ class View(Result, shown_as="view"):
     distance = Shown(Number, lambda self: self.home.distance)
 
     def scene(self) -> dict[str, Any]:
-        """What the page is given."""
+        """Return the data for the page."""
         every = eyes(self.setup)
         return {
             **stage(self.setup, self.machines, self.arrows),
@@ -154,13 +177,27 @@ def view(
 ) -> View:
     """A 3D view in the browser: sliders that keep the loops closed, what is observed, assembly modes.
 
-    A 3D view of a robot, with ``hidden`` also of its hidden robot: every position of a slider is a closed
-    configuration in which only one of the platform's coordinates differs from the zero configuration.
+    Parameters
+    ----------
+    robot, observe, camera, sensor, seed
+        As for ``derive``. Without ``hidden`` neither a platform nor a segment is needed: the first link that can be the
+        platform is moved, and ``notes`` report it.
+    hidden
+        Show the hidden robot too.
 
-    ``observe``, ``camera`` and ``sensor`` are as for ``derive``, which also says what is raised; without ``hidden``
-    neither a platform nor a segment is needed: the first link that could be the platform is moved, and ``notes`` say
-    so. Assembly modes that cannot be listed and missing meshes are reported in ``notes``.
+    Returns
+    -------
+    View
+        Every position of a slider is a closed configuration in which one coordinate of the platform differs from the
+        zero configuration. ``notes`` report assembly modes that cannot be listed, and missing meshes.
 
+    Raises
+    ------
+    HrsynthError
+        As for ``derive``.
+
+    Examples
+    --------
     >>> hrsynth.view("3rrr_m1")
     <View: 3rrr_m1, 3 sliders, 1 other assembly modes>
     """
@@ -201,7 +238,7 @@ def view(
             )
         )
     elif hidden:
-        notes = (*notes, "every leg is blind: there is no hidden robot")
+        notes = (*notes, "every observed direction is constant: there is no hidden robot")
     arrows = tuple(arrows_of(setup, setup.observed))
     return View(
         setup,
@@ -218,7 +255,7 @@ def view(
 
 
 def stage(setup: ObservedRobot, machines: Sequence[Machine], arrows: Iterable[Arrow]) -> dict[str, Any]:
-    """What any page is given of what stands on its stage."""
+    """Return the data of a scene for the page."""
     mechanism, normal = setup.mechanism, plane_normal(setup.motion)
     places = {name: i for i, name in enumerate(mechanism.links)}
     return {
@@ -235,8 +272,8 @@ def stage(setup: ObservedRobot, machines: Sequence[Machine], arrows: Iterable[Ar
 
 
 def freedoms(setup: ObservedRobot) -> dict[str, Array]:
-    """The directions (k, 3) along which the platform is moved, and those about which it is turned: as many together as
-    it has freedoms, those of its coordinates where it moves along or turns about more."""
+    """Return the directions (k, 3) of the platform's translations and rotations: together as many as its dof, those of
+    its coordinates if there are more."""
     motion = setup.motion
     places = np.array(
         Coordinates.of(setup.all_samples.start, setup.all_samples.observation_model, motion).places, dtype=int
@@ -253,7 +290,7 @@ def freedoms(setup: ObservedRobot) -> dict[str, Array]:
 def machine_of(
     key: str, setup: ObservedRobot, mechanism: Mechanism, words: str, places: Sequence[Array], meshes: Sequence[Shape]
 ) -> Machine:
-    """A mechanism to be drawn, ``key`` real or hidden, its rails as long as it slides in the ``places`` (links, 7)."""
+    """Return a mechanism to be drawn, ``key`` real or hidden, with rails for displacements ``places`` (links, 7)."""
     real = setup.mechanism
     kept = tuple(shape for shape in meshes if shape.link in mechanism.links)
     drawer = Drawer(mechanism, real, setup.decomposition.platform, _radius(real), kept)
@@ -276,7 +313,7 @@ def _radius(mechanism: Mechanism) -> float:
 
 
 def _travels(drawer: Drawer, states: Sequence[Array]) -> dict[str, tuple[float, float]]:
-    """How far each joint on the base slides, with a margin for its carriage (m)."""
+    """Return the travel of each prismatic joint on the base, with a margin for its carriage (m)."""
     from scipy.spatial.transform import Rotation
 
     links = {name: i for i, name in enumerate(drawer.mechanism.links)}

@@ -1,1 +1,1 @@
-"""One module a question of the studio, found by its name: ``answer`` takes the request and gives plain data."""
+"""Analyses of the studio, one module each: ``answer`` takes the request and returns plain data."""

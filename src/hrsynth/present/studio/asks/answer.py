@@ -1,4 +1,4 @@
-"""The plain answer: which legs to watch, how wrong the platform can be then, and where else the loop may stop."""
+"""Summary: the legs to observe, the error of the platform with them, other poses at which the loop may stop."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .watch import smallest
 
 
 def answer(request: Request) -> dict[str, Any]:
-    """Three sentences about a robot at its zero configuration, of the smallest sets of legs that see most the one with
+    """Return three sentences about a robot at its zero configuration, for the smallest leg set of the best rank with
     the least error there."""
     setup = ObservedRobot.of(request.mechanism, "all", request.camera)
     found = [(watching(setup, each), each) for each in smallest(setup)]
@@ -34,7 +34,7 @@ def answer(request: Request) -> dict[str, Any]:
 
 
 def watching(setup: ObservedRobot, verdict: Verdict) -> ObservedRobot:
-    """The robot with the legs of a verdict watched."""
+    """Return the robot with the legs of a verdict observed."""
     return replace(setup, observed=tuple(each for each in setup.observed if each.leg in verdict.legs))
 
 
@@ -44,9 +44,9 @@ def _size(wrong: dict[str, Any]) -> float:
 
 
 def rest(setup: ObservedRobot) -> list[str]:
-    """How wrong the platform can be at the zero configuration, and where else the loop may stop."""
+    """Describe the error of the platform at the zero configuration, and other poses at which the loop may stop."""
     first = home_error(error(setup, setup.all_samples.start))
     try:
         return [first, elsewhere(modes(setup))]
     except HrsynthError as problem:
-        return [first, f"Other poses at which the loop may stop could not be listed: {problem}."]
+        return [first, f"Other poses at which the loop may stop are not listed: {problem}."]

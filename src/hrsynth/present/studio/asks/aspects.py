@@ -1,4 +1,4 @@
-"""Which of the poses at which the watched legs look the same a path without Type 2 singularity joins."""
+"""Aspects of the assembly modes: modes that a path without Type 2 singularity joins."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from ..request import Request
 
 
 def answer(request: Request) -> dict[str, Any]:
-    """The modes by their numbers, those together that lie in one aspect, and what shows it of which two; ``aspect`` is
-    the number of each mode's where every verdict is certified, else null."""
+    """Return the modes by number, grouped by aspect, and the verdict on each pair; ``aspect`` is the number of each
+    mode's aspect if every verdict is proved, else null."""
     setup = request.seeing()
     here = request.here(request.mover())
     found = aspects(setup, at=here.real)
@@ -32,7 +32,7 @@ def answer(request: Request) -> dict[str, Any]:
 
 
 def words(found: AspectTable) -> str:
-    """How many aspects hold them."""
+    """Describe the aspects of the modes."""
     if not found.groups:
-        return "no aspect: there is no mode at which the robot was found assembled"
+        return "no aspect: the robot was not found assembled at any mode"
     return f"aspects of the hidden robot: {found.aspects_met} ({aspect_groups(found)})"

@@ -1,4 +1,4 @@
-"""What is taken away: a page, a report, a figure, a robot file."""
+"""Export of a page, a report, a figure or a robot file."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NATIVE = "native"
 
 
 def answer(request: Request) -> dict[str, Any]:
-    """The file of a ``kind``, its bytes in base64."""
+    """Return the file of a ``kind``, its bytes in base64."""
     kind = request.text("kind", KINDS)
     if kind is None:
         raise BadRequest("kind", None, tuple(KINDS))
@@ -77,4 +77,4 @@ KINDS: dict[str, tuple[str, str, Callable[[Request], tuple[str, bytes, dict[str,
     "figure": (".svg", "image/svg+xml", _figure),
     "robot": (".urdf", "application/xml", _robot),
 }
-"""Ending, type and maker of each kind."""
+"""Suffix, media type and maker of each kind."""

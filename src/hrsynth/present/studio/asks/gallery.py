@@ -1,4 +1,4 @@
-"""The shipped robots with a picture each, and the files of the folder that was opened."""
+"""Gallery: the shipped robots with drawings, and the files of the opened folder."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ from ...portrait import Portrait
 from ..request import SHIPPED, Request
 
 ENDINGS = (".urdf", ".xacro", ".sdf", ".xml", ".mjcf", ".usd", ".usda", ".usdc", ".usdz", ".yaml", ".yml")
-"""Of files that may be robots."""
+"""Suffixes of files that may be robots."""
 WIDTH, HEIGHT = 180, 130
-"""Of a picture (pixels)."""
+"""Size of a drawing (pixels)."""
 
 
 def answer(request: Request) -> dict[str, Any]:
-    """All robots that can be opened by a click."""
+    """Return all robots that can be opened by a click."""
     return {"robots": robots(), "files": [] if request.folder is None else files(request)}
 
 
 @cache
 def robots() -> list[dict[str, Any]]:
-    """The shipped robots, sorted."""
+    """Return the shipped robots, sorted."""
     known = {each.name: each for each in ROBOTS}
     return [
         {
             "source": f"{SHIPPED}:{name}",
             "name": name,
             "title": name.replace("_", " "),
-            "words": f"{parse(known[name].architecture)}, {known[name].dof} freedoms",
+            "words": f"{parse(known[name].architecture)}, {known[name].dof} dof",
             "picture": picture(load(name)),
         }
         for name in list_robots()
@@ -46,14 +46,14 @@ def robots() -> list[dict[str, Any]]:
 
 
 def picture(robot: Mechanism) -> str:
-    """A small drawing of a robot."""
+    """Draw a robot, small."""
     decomposition = decompose(normal_form(robot).mechanism)
     portrait = Portrait.draw(decomposition.mechanism, decomposition.platform, (), flat(decomposition.mechanism))
     return portrait.svg(WIDTH, HEIGHT, robot.name)
 
 
 def flat(robot: Mechanism) -> Array | None:
-    """The normal of the plane to which the joints of a robot confine it, None where they do not."""
+    """Return the normal of the plane to which the joints of a robot confine it, None if they do not."""
     turns = [joint.axis for joint in robot.joints.values() if joint.type is JointType.REVOLUTE]
     slides = [joint.axis for joint in robot.joints.values() if joint.type is JointType.PRISMATIC]
     if not turns or len(turns) + len(slides) < len(robot.joints):
@@ -63,7 +63,7 @@ def flat(robot: Mechanism) -> Array | None:
 
 
 def files(request: Request) -> list[str]:
-    """The robot files of the folder, by name; links that lead out of it are none."""
+    """List the robot files of the folder, by name; links that lead out of it are ignored."""
     assert request.folder is not None
     try:
         named = [path.name for path in request.folder.iterdir() if path.suffix.lower() in ENDINGS and path.is_file()]

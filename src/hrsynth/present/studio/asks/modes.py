@@ -1,4 +1,4 @@
-"""The poses at which the watched legs look the same, each with where to fly."""
+"""Assembly modes: poses with the same observed directions, each with the configuration to fly to."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ..request import Request
 
 
 def answer(request: Request) -> dict[str, Any]:
-    """All assembly modes with the directions at ``here``, and whether these are all."""
+    """Return all assembly modes with the directions at ``here``, and whether the list is complete."""
     setup = request.seeing()
     here = request.here(request.mover())
     found = modes(setup, at=here.real)
@@ -33,9 +33,9 @@ def answer(request: Request) -> dict[str, Any]:
 
 
 def words(found: AssemblyModes) -> str:
-    """How many there are, and by which proof these are all."""
+    """Describe the number of modes, and the proof that the list is complete."""
     if found.found.continuous_family is not None and found.found.complex is not None:
-        return f"a continuum of poses: {found.found.singular_solutions}"
+        return f"a continuous family of poses: {found.found.singular_solutions}"
     more = "" if found.found.singular_solutions is None else f"; {found.found.singular_solutions}"
     alike = f"{found.alike}; " if found.near_modes else ""
     return f"{alike}{found.count}, {all_of(found)}; {found.found.proof}{more}"
@@ -46,12 +46,12 @@ def _mode(request: Request, found: AssemblyModes, number: int, mode: AssemblyMod
         there = at_mode(found, ModeNumber(number))
     except PoseNotReached:
         there = None
-    told = "the pose itself" if mode.goal else assembly(mode, found.setup.limits_ignored)[0]
+    told = "the present pose" if mode.goal else assembly(mode, found.setup.limits_ignored)[0]
     return _told(request, found, f"mode {number}", mode, told, there)
 
 
 def _near(request: Request, found: AssemblyModes, number: int, mode: NearMode) -> dict[str, Any]:
-    told = f"differs {mode.differs}; {assembly(mode, found.setup.limits_ignored)[0]}"
+    told = f"measured values differ {mode.differs}; {assembly(mode, found.setup.limits_ignored)[0]}"
     return _told(request, found, f"near {number}", mode, told, mode.configuration)
 
 

@@ -1,4 +1,4 @@
-"""The robot moved: by its sliders, by its platform, to where it is known to be, or home; its loops stay closed."""
+"""Motion of the robot with closed loops: by sliders, by its platform, to a known or the zero configuration."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from ...view.states import BEYOND_SLIDERS, Mover, Posed
 from ..request import Request
 
 PLACE = 7
-"""Numbers of a place: position and unit quaternion."""
+"""Numbers of a displacement: position and unit quaternion."""
 
 
 def answer(request: Request) -> dict[str, Any]:
-    """Where the robot comes to from ``here`` when its sliders are at ``values``, or when its platform is drawn to the
-    place ``platform`` (its displacement from home); without either, what is at ``here``."""
+    """Move the robot from ``here`` to the slider ``values``, or its platform to the displacement ``platform`` from the
+    zero configuration; without either, describe ``here``."""
     mover = request.mover(request.flag("hidden"))
     here = request.here(mover)
     values = request.vector("values", len(mover.coordinates.places))
     place = request.vector("platform", PLACE)
     if values is not None and place is not None:
-        raise BadRequest("both values and a place of the platform are given", None, "one of them")
+        raise BadRequest("values and platform: both are given", remedy="Give one of them.")
     if values is not None:
         if mover.far(values):
-            raise BadRequest("values", values.tolist(), "what the robot's sliders can mean")
+            raise BadRequest("values", values.tolist(), "values within reach of the sliders")
         here, reached = mover.send(here, values)
         return describe_pose(request, mover, here, bool(np.max(np.abs(reached - values), initial=0.0) > SLIDER_ARRIVED))
     if place is not None:
@@ -45,14 +45,14 @@ def _draw_pose(request: Request, mover: Mover, here: Posed, place: Any) -> dict[
     link = mover.setup.motion.link
     wanted = pose(place[:3], rotation_of(place[[6, 3, 4, 5]] / size)) @ mover.setup.mechanism.links[link].pose
     if float(np.linalg.norm(place[:3])) > BEYOND_SLIDERS * mover.home.real.model.length:
-        raise BadRequest("platform", place.tolist(), f"within {BEYOND_SLIDERS:g} sizes of the robot")
+        raise BadRequest("platform", place.tolist(), f"within {BEYOND_SLIDERS:g} characteristic lengths")
     found = mover.draw_to(here, wanted)
     apart = np.abs(found.real.pose(link) - wanted).max()
     return describe_pose(request, mover, found, bool(apart > SLIDER_ARRIVED))
 
 
 def describe_pose(request: Request, mover: Mover, posed: Posed, stopped: bool = False) -> dict[str, Any]:
-    """A configuration with all that is shown of it; ``stopped``: it is not where it was sent."""
+    """Return a configuration with all that is shown of it; ``stopped``: it did not reach its target."""
     return {
         "state": state(request, mover, posed),
         "here": request.describe_here(posed),
@@ -63,6 +63,6 @@ def describe_pose(request: Request, mover: Mover, posed: Posed, stopped: bool = 
 
 
 def state(request: Request, mover: Mover, posed: Posed) -> dict[str, Any]:
-    """What is drawn of a configuration, how wrong the platform can be there, and the joints beyond their limits."""
-    wrong = nothing(unit_of(mover.setup), "no leg is watched") if request.blind else error(mover.setup, posed.real)
+    """Return what is drawn of a configuration, the error of the platform, and the joints beyond their limits."""
+    wrong = nothing(unit_of(mover.setup), "no leg is observed") if request.blind else error(mover.setup, posed.real)
     return {**mover.state(posed).scene(), "error": wrong, "beyond": outside(posed.real.model, posed.real.q)}

@@ -1,4 +1,4 @@
-"""A robot on the stage: all that a page draws of it, its legs and sliders, and what was guessed of its file."""
+"""Scene of a robot: its drawing, legs and sliders, and the assumptions of reading its file."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from ..request import Request
 from .move import describe_pose
 
 MOST_OFFERED = 30
-"""Candidates of a guess that are offered."""
+"""Largest number of alternatives to an assumption that are offered."""
 
 
 def answer(request: Request) -> dict[str, Any]:
-    """The scene of a robot. Where its file can be read but no robot be made of it: why (``failed``), and what was
-    guessed."""
+    """Return the scene of a robot. If its file can be read but makes no robot: the reason (``failed``) and the
+    assumptions."""
     found = guess_choices(request)
     guesses = [] if found is None else list(offers(request, found))
     dialect = "hrsynth" if found is None else found.dialect
@@ -49,7 +49,7 @@ def answer(request: Request) -> dict[str, Any]:
 
 
 def scene(request: Request) -> dict[str, Any]:
-    """What is drawn and moved."""
+    """Return what is drawn and moved."""
     setup, mover = request.setup, request.mover()
     known = {each.leg: each for each in (*setup.segments, *setup.observed)}
     shapes, missing = meshes(setup, request.fence)
@@ -59,7 +59,7 @@ def scene(request: Request) -> dict[str, Any]:
     here = request.here(mover)
     return {
         **stage(setup, [machine], arrows_of(setup, known.values())),
-        "words": f"{words}, {setup.dof} freedom{'s' * (setup.dof != 1)}",
+        "words": f"{words}, {setup.dof} dof",
         "legs": [_leg(request, setup, leg) for leg in setup.decomposition.legs],
         "sliders": sliders(mover, request.ends),
         "scale": scale(unit_of(setup)),
@@ -70,7 +70,7 @@ def scene(request: Request) -> dict[str, Any]:
 
 
 def sliders(mover: Mover, ends: Sequence[tuple[Posed, Posed]]) -> list[dict[str, Any]]:
-    """A slider for each freedom, as far as it goes alone from home."""
+    """Return a slider for each platform coordinate, over its range from the zero configuration."""
     made = []
     coordinates = mover.coordinates
     for number, (name, place, pair) in enumerate(zip(coordinates.names, coordinates.places, ends, strict=True)):
@@ -91,7 +91,7 @@ def sliders(mover: Mover, ends: Sequence[tuple[Posed, Posed]]) -> list[dict[str,
 
 
 def _leg(request: Request, setup: ObservedRobot, leg: Leg) -> dict[str, Any]:
-    """A leg: its chain, whether it can be watched, and why at this link, or why not; what to ``ask`` for it by."""
+    """Return a leg: its chain, whether it can be observed, the reason, and its name in requests (``ask``)."""
     seen = next((each for each in setup.observed if each.leg == leg.label), None)
     default = next((each for each in setup.segments if each.leg == leg.label), None)
     shown, why = seen or default, None
@@ -114,7 +114,7 @@ def _leg(request: Request, setup: ObservedRobot, leg: Leg) -> dict[str, Any]:
 
 
 def guess_choices(request: Request) -> ImportChoices | None:
-    """What the file leaves open, None where it says all, or cannot be read."""
+    """Return the assumptions of reading a file, None if there are none or it cannot be read."""
     said = dict(request.source.options)
     try:
         given = Overrides.said(
@@ -130,7 +130,7 @@ def guess_choices(request: Request) -> ImportChoices | None:
 
 
 def offers(request: Request, found: ImportChoices) -> Iterator[dict[str, Any]]:
-    """What was guessed, by the name of the option that says otherwise, with what could be meant instead."""
+    """Yield each assumption by the name of the option that overrides it, with the alternatives."""
     said = dict(request.source.options)
 
     def offer(name: str, now: Any, why: str, candidates: list[Any]) -> dict[str, Any]:
@@ -138,9 +138,9 @@ def offers(request: Request, found: ImportChoices) -> Iterator[dict[str, Any]]:
         return {"name": name, "found": now, "why": why, "candidates": offered[:MOST_OFFERED]}
 
     if found.platforms:
-        told = "chosen" if "platform" in said else found.why if found.told else "several could be"
+        told = "chosen" if "platform" in said else found.why if found.told else "several are possible"
         yield offer(
-            "platform", said.get("platform", found.platforms[0]), told or "the file says so", list(found.platforms)
+            "platform", said.get("platform", found.platforms[0]), told or "given by the file", list(found.platforms)
         )
     if len(found.bases) > 1:
         yield offer("base", said.get("base", found.bases[0]), "no joint carries it", list(found.bases))
@@ -148,7 +148,7 @@ def offers(request: Request, found: ImportChoices) -> Iterator[dict[str, Any]]:
     yield offer(
         "motors",
         list(said.get("motors", driven)),
-        "chosen" if "motors" in said else "as the file says",
+        "chosen" if "motors" in said else "as in the file",
         [driven, found.proposed_motors],
     )
     if found.candidates or "close" in said:
@@ -156,13 +156,13 @@ def offers(request: Request, found: ImportChoices) -> Iterator[dict[str, Any]]:
         yield offer(
             "close",
             list(said.get("close", ())),
-            "frames that lie near to each other could meet",
+            "neighbouring frames that a loop closure may join",
             [[], near, *([each] for each in near)],
         )
-    yield offer("unit", said.get("unit", "m"), "of the file's lengths", list(UNITS))
+    yield offer("unit", said.get("unit", "m"), "of the lengths in the file", list(UNITS))
     yield offer(
         "as_written",
         said.get("as_written", False),
-        "otherwise what is parallel, or meets, up to rounding is made so",
+        "if no: axes that are parallel or intersect up to rounding are snapped",
         [False, True],
     )

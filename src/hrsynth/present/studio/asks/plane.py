@@ -1,4 +1,4 @@
-"""Values over a plane of poses: how wrong the platform can be, how far a singularity is, where a freedom is lost."""
+"""Values over a plane of poses: errors of the platform, singularity distance, the Type 2 locus."""
 
 from __future__ import annotations
 
@@ -32,24 +32,24 @@ from ..request import Request
 
 ACCURACY, DISTANCE = "accuracy", "distance"
 DISTANCES = (0.01, 0.03, 0.1, 0.3)
-"""Steps of the distance to a singularity (the smallest singular value of Mᵀ, characteristic lengths)."""
+"""Steps of the singularity distance (the smallest singular value of Mᵀ, characteristic lengths)."""
 CHECKED = 2
-"""Poses at which the batch is held against Pinocchio: it is asked again and again while a plane is dragged."""
+"""Poses at which the batch is compared with Pinocchio; few, as a dragged plane is computed often."""
 SIZE = 24
-"""Values a side, where no number is asked for."""
+"""Values per side, by default."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PoseField(Value):
     """Values (n, n) over a plane, NaN where no pose is reached, the first index along the first coordinate, and the
-    segments (k, 2, 2) of the curve on which a freedom is lost, in the two coordinates."""
+    segments (k, 2, 2) of the Type 2 locus, in the two coordinates."""
 
     values: Array
     locus: Array
 
 
 def answer(request: Request) -> dict[str, Any]:
-    """A plane of two coordinates, the others as at ``here``, the third at ``at``."""
+    """Return a plane of two coordinates, the others as at ``here``, the third at ``at``."""
     setup, mover = request.seeing(), request.mover()
     sees_all(setup)
     here = request.here(mover)
@@ -100,19 +100,19 @@ def answer(request: Request) -> dict[str, Any]:
     }
 
 
-SINGLY = " The poses were found one by one: where a freedom is lost between them is not drawn."
+SINGLY = " The poses were computed one by one: the Type 2 locus between them is not drawn."
 
 
 def _range(request: Request, mover: Mover, index: int) -> Array:
-    """The least and the largest value of a coordinate's slider, (2,)."""
+    """Return the least and the largest value of a coordinate's slider, (2,)."""
     return np.sort([mover.read(end)[index] for end in request.ends[index]])
 
 
 def _pair(mover: Mover, said: str | None) -> tuple[int, int]:
-    """The two coordinates that are named, one name after the other; the first two where none are."""
+    """Return the two coordinates whose names are joined in ``said``, by default the first two."""
     names = mover.coordinates.names
     if len(names) < 2:
-        raise BadRequest("a plane of a platform with fewer than two freedoms", said)
+        raise BadRequest("of: the platform has fewer than two dof, so no plane", said)
     found = [pair for pair in permutations(range(len(names)), 2) if said in (None, names[pair[0]] + names[pair[1]])]
     if not found:
         raise BadRequest("of", said, [names[i] + names[j] for i, j in permutations(range(len(names)), 2)])
@@ -120,7 +120,7 @@ def _pair(mover: Mover, said: str | None) -> tuple[int, int]:
 
 
 def _at_batch(mover: Mover, at: ClosedConfiguration) -> bool:
-    """Whether a configuration is the one that closed forms give at its pose."""
+    """Return True if a configuration is that of the closed forms at its pose."""
     placer = mover.setup.placer
     if placer is None:
         return False
@@ -131,7 +131,7 @@ def _at_batch(mover: Mover, at: ClosedConfiguration) -> bool:
 def together(
     mover: Mover, here: ClosedConfiguration, pair: tuple[int, int], values: Array, ranges: list[Array], size: int
 ) -> Grid | None:
-    """The plane as a grid of poses, None where the parts of a pose do not say it."""
+    """Return the plane as a grid of poses, None if coordinates of a pose cannot express it."""
     names, motion = mover.coordinates.names, mover.setup.motion
     turns = [i for i, name in enumerate(names) if name not in SCALARS]
     if turns and (
@@ -151,7 +151,7 @@ def together(
 
 
 def grid_text(grid: Grid) -> str:
-    """The grid as an option says it."""
+    """Format the grid as an option."""
     held = [f"{name}={'/'.join(map(digits, values))}" for name, values in grid.fixed.given.items()]
     return ",".join(
         [*(f"{name}={digits(values[0])}:{digits(values[-1])}:{len(values)}" for name, values in grid.axes), *held]
@@ -159,7 +159,7 @@ def grid_text(grid: Grid) -> str:
 
 
 def by_batch(mapper: Mapper, grid: Grid, kind: str, unit: str) -> PoseField:
-    """The plane by closed forms, held against Pinocchio at some of its poses."""
+    """Evaluate the plane by closed forms, compared with Pinocchio at some poses."""
     found = mapper.over(grid, 0, CHECKED)
     table = found.smallest if kind == DISTANCE else _in_unit(found.position, found.orientation, unit)
     signs, (x, y) = found.determinant, (values for _, values in grid.axes)
@@ -182,7 +182,7 @@ def one_by_one(
     kind: str,
     unit: str,
 ) -> PoseField:
-    """The plane pose by pose, each led to from a neighbour, in the working mode of ``here``."""
+    """Evaluate the plane pose by pose, each tracked from a neighbour, in the working mode of ``here``."""
     setup, motion, question = mover.setup, mover.setup.motion, mover.setup.samples.observation_model
     aims = []
     axes = [np.linspace(ends[0], ends[1], size) for ends in ranges]
@@ -205,13 +205,13 @@ def one_by_one(
 
 
 def _in_unit(position: Array, orientation: Array, unit: str) -> Array:
-    """Errors in the unit in which they are shown; where they have no bound, more than any step."""
+    """Return errors in the unit in which they are shown; unbounded ones exceed any step."""
     found = 1e3 * position if unit == "mm" else np.degrees(orientation)
     return np.where(np.isinf(position) | np.isinf(orientation), FARTHEST_POSE, found)
 
 
 def _crossings(x: Array, y: Array, values: Array) -> Iterator[Array]:
-    """Segments (2, 2) on which values (nx, ny) vanish, between the sides of each cell that they cross."""
+    """Yield segments (2, 2) on which values (nx, ny) vanish, between the sides of each cell that they cross."""
     for i, j in np.argwhere(np.isfinite(values[:-1, :-1] + values[1:, :-1] + values[:-1, 1:] + values[1:, 1:])):
         corners = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1), (i, j)]
         met = []
@@ -224,7 +224,8 @@ def _crossings(x: Array, y: Array, values: Array) -> Iterator[Array]:
 
 
 def _placer(mover: Mover, pair: tuple[int, int], values: Array) -> Callable[[float, float], Array]:
-    """Where a point of the plane is drawn: a turn along its axis, one radian as long as the robot's length."""
+    """Return the function that draws points of the plane; a rotation is a distance along its axis, one radian the
+    characteristic length."""
     motion, length = mover.setup.motion, mover.home.real.model.length
     ways, origin = np.eye(6, 3), motion.position(mover.home.real.pose(motion.link))
     ways[3:] = length * np.eye(3)
@@ -245,14 +246,14 @@ def _placer(mover: Mover, pair: tuple[int, int], values: Array) -> Callable[[flo
 
 
 def _words(kind: str, unit: str, found: PoseField, length: float) -> str:
-    """How much is reached, and between which values it lies."""
+    """Describe the number of reached poses and the range of the values."""
     here = found.values[np.isfinite(found.values)]
     if not here.size:
         return "No pose of this plane is reached."
     part = f"{here.size} of these {found.values.size} poses are reached"
     if kind == DISTANCE:
-        return f"{part}; there the smallest singular value of Mᵀ lies between {here.min():.2g} and {here.max():.2g}."
+        return f"{part}; the smallest singular value of Mᵀ lies between {here.min():.2g} and {here.max():.2g}."
     most = float(here.max())
     near = is_bounded(most / 1e3, length) if unit == "mm" else is_bounded(np.radians(most))
     worst = f"{round_digits(most)}{SIGNS[unit]}" if near else f"more, {NOT_BOUNDED}"
-    return f"{part}; there the platform is off, per 0.1°, by {round_digits(float(here.min()))}{SIGNS[unit]} to {worst}."
+    return f"{part}; error of the platform per 0.1°: {round_digits(float(here.min()))}{SIGNS[unit]} to {worst}."

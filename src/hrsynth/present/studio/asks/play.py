@@ -1,4 +1,4 @@
-"""A lost freedom as a motion: the platform goes forth and back while the watched directions stay."""
+"""Motion along an unobserved twist: the platform moves back and forth while the observed directions stay."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from ..request import Request
 from .move import state
 
 STEPS = 12
-"""Configurations each way."""
+"""Configurations in each direction."""
 
 
 def answer(request: Request) -> dict[str, Any]:
-    """The motion of the lost freedom number ``lost`` at ``here``, as ``watch`` lists them; no more than where it is
-    where the directions stay to first order only."""
+    """Return the motion along the unobserved twist number ``lost`` at ``here``, as ``watch`` lists them; only ``here``
+    if the directions stay constant to first order only."""
     number = request.count("lost", 0, LARGEST_STUDIO_LIST)
     setup, mover = request.seeing(), request.mover(request.flag("hidden"))
     here = request.here(mover)
     lost = ConfigurationAnalysis.of(setup).examine(here.real).hidden.unobserved
     if number is None or number >= len(lost):
-        raise BadRequest("number of a lost freedom", number, f"0 to {len(lost) - 1}" if lost else "none is lost here")
+        raise BadRequest("lost: no such unobserved twist", number, f"0 to {len(lost) - 1}" if lost else "none")
     question = setup.samples.observation_model
     ways = [
         mover.follow_hidden(here, way)
@@ -50,9 +50,9 @@ def _there_and_back(way: list[Posed]) -> list[Posed]:
 
 
 def _words(name: str, question: ObservationModel, here: Posed, way: list[Posed]) -> str:
-    """What is played, and how well the directions stay."""
+    """Describe the motion, and how constant the directions are."""
     if not way:
-        return f"{name}: no motion along it was found, the watched directions stay to first order only"
+        return f"{name}: no finite motion found; the observed directions are constant to first order only"
     held = FixedValuesTask.at(here.real.model, here.real.q, question.reference, question.observations)
     worst = max(float(np.linalg.norm(system(each.real.model, each.real.q, held)[0])) for each in way)
-    return f"{name}: the watched directions stay, loops and directions to {worst:.0e}"
+    return f"{name}: the observed directions stay constant; residual of loops and directions {worst:.0e}"

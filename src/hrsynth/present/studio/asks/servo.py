@@ -1,4 +1,4 @@
-"""A servo run from where the robot is to where it is wanted, with the picture of its camera."""
+"""Servo run from the present to a desired configuration, with the image of its camera."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from ..request import Request
 from .move import state
 
 FRAMES = 60
-"""Of a run that is shown."""
+"""Frames of a run."""
 
 Poses = Callable[[str], Array]
 
 
 def answer(request: Request) -> dict[str, Any]:
-    """The run from ``here`` to ``end``, a configuration told as ``here`` is, or to the coordinates ``goal``."""
+    """Return the run from ``here`` to the configuration ``end``, or to the coordinates ``goal``."""
     setup, mover = request.seeing(), request.mover(request.flag("hidden"))
     start = request.here(mover)
     end = _send_to(request, mover, start) if request.fields.get("end") is None else request.here(mover, "end")
@@ -52,24 +52,24 @@ def answer(request: Request) -> dict[str, Any]:
         "desired": image(eye, reference, rods, end.real.pose),
         "size": [eye.width, eye.height],
         "kind": found.outcome,
-        "words": f"Ended in: {found.outcome} ({found.run_outcome.reason}), after {found.run.times[-1]:.3g} s",
+        "words": f"Outcome: {found.outcome} ({found.run_outcome.reason}), after {found.run.times[-1]:.3g} s",
         **(same if same_at(setup, start.real, end.real) else NONE),
     }
 
 
 def _send_to(request: Request, mover: Mover, start: Posed) -> Posed:
-    """The configuration with the coordinates ``goal`` to which small steps lead."""
+    """Track the robot to the coordinates ``goal``."""
     goal = request.vector("goal", len(mover.coordinates.places))
     if goal is None or mover.far(goal):
-        raise BadRequest("goal", None if goal is None else goal.tolist(), "values of the robot's sliders")
+        raise BadRequest("goal", None if goal is None else goal.tolist(), "values within reach of the sliders")
     end, reached = mover.send(start, goal)
     if np.max(np.abs(reached - goal), initial=0.0) > SLIDER_ARRIVED:
-        raise BadRequest("the goal is not reached from the start", goal.tolist(), "values that the robot comes to")
+        raise BadRequest("goal: not reached from the start", goal.tolist(), remedy="Choose a goal closer to the start.")
     return end
 
 
 def image(eye: Camera, reference: str, rods: tuple[Cylinder, ...], poses: Poses) -> list[list[list[float]] | None]:
-    """The two ends of each watched leg in the picture (pixels); None of one that is not ahead of the camera."""
+    """Return the two ends of each observed leg in the image (pixels); None for one that is behind it."""
     found: list[list[list[float]] | None] = []
     for rod in rods:
         ends = eye.project(poses(reference), poses, rod)

@@ -1,4 +1,4 @@
-"""What the watched legs see: the verdict, lost freedoms, the hidden robot, when it is singular, the smallest sets."""
+"""Verdict on the observed legs: unobserved twists, the hidden robot, its singularities, the smallest sets."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ from ..commands import lines
 from ..request import Request
 
 MOST_SETS = 10
-"""Smallest sets that are listed."""
+"""Largest number of smallest sets that are listed."""
 
 
 def answer(request: Request) -> dict[str, Any]:
-    """All that follows from which legs are watched, at ``here``."""
+    """Return the verdict on the observed legs, at ``here``."""
     setup = request.setup
     best = [each for each in smallest(all_legs(setup)) if each.rank]
     sets = {
@@ -45,7 +45,7 @@ def answer(request: Request) -> dict[str, Any]:
     }
     if request.blind:
         return {
-            "verdict": {"controllable": False, "words": "no leg is watched", "certainty": ""},
+            "verdict": {"controllable": False, "words": "no leg is observed", "certainty": ""},
             "rank": 0,
             "dof": setup.dof,
             "lost": [],
@@ -54,7 +54,7 @@ def answer(request: Request) -> dict[str, Any]:
             "condition": "",
             **sets,
             "ellipsoid": None,
-            "error": nothing(unit_of(setup), "no leg is watched"),
+            "error": nothing(unit_of(setup), "no leg is observed"),
             **lines(request, "legs"),
         }
     derivation, mover = request.derivation, request.mover()
@@ -82,12 +82,12 @@ def answer(request: Request) -> dict[str, Any]:
 
 
 def words(verdict: Verdict) -> str:
-    """What a set of legs sees, and that it sees less at the zero configuration, where it does."""
+    """Describe the verdict on a set of legs, and a lower rank at the zero configuration."""
     return "; ".join([verdict.verdict, *at_zero(verdict)])
 
 
 def describe_lost(freedom: Freedom, point: list[float]) -> dict[str, Any]:
-    """A lost freedom; its ``kind`` is translation or rotation (a screw is one too)."""
+    """Return an unobserved twist; its ``kind`` is translation or rotation (also of a screw)."""
     turns = bool(np.linalg.norm(freedom.twist[3:]) > NAMED)
     return {
         "words": freedom.name,
@@ -98,7 +98,7 @@ def describe_lost(freedom: Freedom, point: list[float]) -> dict[str, Any]:
 
 
 def hidden_machine(request: Request) -> dict[str, Any] | None:
-    """The hidden robot as a machine to be drawn, None where every leg is blind."""
+    """Return the hidden robot as a machine to be drawn, None if every observed direction is constant."""
     found = request.derivation
     if found.hidden is None:
         return None
@@ -109,18 +109,18 @@ def hidden_machine(request: Request) -> dict[str, Any] | None:
 
 
 def hidden_words(request: Request) -> str:
-    """The hidden robot's legs, and how it was compared with the real one."""
+    """Describe the legs of the hidden robot, and the equivalence check."""
     found = request.derivation
     legs = found.hidden_architecture
     return (
-        f"{legs}; certificate {certificate(found.equivalence)}"
+        f"{legs}; equivalence check {certificate(found.equivalence)}"
         if legs
         else "none: every observed direction is constant"
     )
 
 
 def condition(setup: ObservedRobot) -> str:
-    """When a freedom is lost that is seen generically (Type 2)."""
+    """Describe the Type 2 condition."""
     robot = MeasuredRobot.of_directions(setup)
     try:
         if robot.verdict.unobserved:
@@ -131,14 +131,13 @@ def condition(setup: ObservedRobot) -> str:
 
 
 def all_legs(setup: ObservedRobot) -> ObservedRobot:
-    """The same robot with all legs watched."""
+    """Return the robot with all legs observed."""
     return ObservedRobot.of(setup.robot, "all")
 
 
 @lru_cache(maxsize=REMEMBERED)
 def smallest(setup: ObservedRobot) -> tuple[Verdict, ...]:
-    """The verdicts of the smallest sets of watched legs that see as much as all of them: those of ``hrsynth legs``, of
-    which larger ones are left out."""
+    """Return the verdicts on the smallest sets of observed legs with the rank of all legs, as in ``hrsynth legs``."""
     labels = labels_of(setup.observed)
     best = verdict_of(setup, labels, setup.samples).rank
     for size in range(1, len(labels) + 1):
@@ -156,8 +155,8 @@ def smallest(setup: ObservedRobot) -> tuple[Verdict, ...]:
 
 
 def ellipsoid(setup: ObservedRobot, at: ClosedConfiguration) -> dict[str, Any] | None:
-    """The ellipsoid that stands for the position errors for 0.1° of each direction (:func:`.error_axes`); None where
-    they have no bound, or there are none."""
+    """Return the ellipsoid of position errors for 0.1° of each direction (:func:`.error_axes`); None if they are
+    unbounded or zero."""
     if not all(isinstance(each, Direction) for each in setup.observed):
         return None
     axes = error_axes(at, setup.samples.observation_model, MeasurementBounds(np.full(len(setup.observed), CONE)))

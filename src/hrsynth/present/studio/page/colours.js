@@ -1,10 +1,10 @@
 "use strict";
-/* What is read of the palette, COLOURS: for each meaning what it is called in the legend, and its colour. */
+/* The palette, COLOURS: label in the legend and colour of each meaning. */
 const Colours = {
   steps: [0, 1, 2, 3, 4].map((step) => COLOURS[`step${step}`][1]),
   of: (meaning) => COLOURS[meaning][1],
   words: (meaning) => COLOURS[meaning][0],
-  /* The meaning of an error's step 0 to 4; of none, that it is not known. */
+  /* The meaning of step 0 to 4 of an error; of none: unknown. */
   step: (step) => Number.isInteger(step) && step >= 0 ? `step${Math.min(4, step)}` : "unknown",
   /* The number of the named thresholds below a value, 0 to 4; more is worse, or with `falling` less is. */
   rank: (value, edges, falling = false) => edges.filter((edge) => falling ? value <= edge : value > edge).length,

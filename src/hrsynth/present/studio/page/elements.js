@@ -115,7 +115,7 @@ class Same {
   }
 }
 
-/* One line that says what is under way, with a button that ends it, or what went wrong. */
+/* One line for progress, with a button that cancels, or for an error. */
 class Status {
   constructor() {
     this.words = element("span", { role: "status" });

@@ -1,5 +1,5 @@
 "use strict";
-/* Handles to drag a platform by: arrows along which it moves and rings about which it turns, of its own freedoms only. */
+/* Handles to drag a platform by: arrows along which it moves and rings about which it turns, of its own dof only. */
 const Gizmo = (() => {
 const { moved, turn, vector } = Solids;
 

@@ -1,6 +1,6 @@
 "use strict";
-/* What a page that was saved has in place of the connection: it answers from the configurations that it holds, in which
-   one coordinate of the platform is away from home. Where it stands is told as which value of which slider, null at home. */
+/* Connection of a saved page: it answers from stored configurations, in which one coordinate of the platform differs
+   from the zero configuration. `here` is the value of a slider, null at the zero configuration. */
 
 class Kept {
   constructor(record, { onstart }) {
@@ -17,7 +17,7 @@ class Kept {
 
   modes() { return { modes: this.record.ghosts, words: "" }; }
 
-  /* The slider that was moved goes on alone: all others go home. */
+  /* Only the slider that was moved keeps its value: all others return to the zero configuration. */
   move({ values, here }) {
     const { sliders, state } = this.record, moved = values ? values.findIndex((value, i) => value !== this.values[i]) : -1;
     const gone = moved >= 0 && { slider: moved, value: sliders[moved].values.indexOf(values[moved]) };

@@ -1,6 +1,6 @@
 "use strict";
-/* The connection to hrsynth: numbered asks, one at a time in each of the two processes of this tab.
-   Of asks on the same channel only the newest waits; asks carry all they need, so they are sent again after a break. */
+/* The connection to hrsynth: numbered requests, one at a time in each of the two processes of this tab.
+   Of requests on the same channel only the newest waits; they are complete, so they are sent again after an interruption. */
 
 class Refused extends Error {
   constructor(message, kind) { super(message); this.kind = kind; }
@@ -38,7 +38,7 @@ class Link {
     Object.values(this.lanes).forEach((lane) => this.next(lane));
   }
 
-  /* Try again, ever more slowly; what was under way waits for it, but not for ever. */
+  /* Reconnect at growing intervals; the present request waits, with a limited number of tries. */
   lost() {
     this.ready = false;
     for (const lane of Object.values(this.lanes)) {
@@ -46,7 +46,7 @@ class Link {
       lane.sent = null;
       if (!ask) continue;
       ask.tries += 1;
-      if (ask.tries >= Link.TRIES) ask.fail(new Refused("the connection broke off twice over this question", "Lost"));
+      if (ask.tries >= Link.TRIES) ask.fail(new Refused("the connection was interrupted twice during this request", "Lost"));
       else if (lane.waiting.has(ask.channel)) ask.done(null);
       else lane.waiting.set(ask.channel, ask);
     }
@@ -56,7 +56,7 @@ class Link {
     this.pause = Math.min(2 * this.pause, Link.LONGEST);
   }
 
-  /* `fields`, or what they are when it is sent. The answer, or null where a newer ask on the channel took its place or it was cancelled; throws Refused. */
+  /* `fields`, or a function called when it is sent. Returns the answer, null if a newer request on the channel replaced it or it was cancelled; throws Refused. */
   ask(kind, fields = {}, channel = kind) {
     const lane = this.lanes[kind === "move" ? "mover" : "desk"];
     return new Promise((done, fail) => {
@@ -67,7 +67,7 @@ class Link {
     });
   }
 
-  /* Send what comes next, if nothing is under way. */
+  /* Send the next request, if none is under way. */
   next(lane) {
     if (lane.sent || !this.ready) return;
     const [ask] = [...lane.waiting.values()].sort((one, other) => Link.order(one) - Link.order(other));
@@ -81,7 +81,7 @@ class Link {
 
   static order(ask) { return Link.LATE.indexOf(ask.kind); }
 
-  /* Of a drag every answer is wanted; of other asks only that to which no newer one waits. */
+  /* Every answer to a drag is used; of others only that without a newer request waiting. */
   answered(said) {
     const lane = Object.values(this.lanes).find(({ sent }) => sent?.n === said.n);
     if (!lane) return;
@@ -94,7 +94,7 @@ class Link {
     else ask.done(said.answer);
   }
 
-  /* End what is asked on a channel. */
+  /* Cancel the requests on a channel. */
   cancel(channel) {
     for (const lane of Object.values(this.lanes)) {
       lane.waiting.get(channel)?.done(null);
@@ -111,7 +111,7 @@ class Link {
   async upload(file) {
     const address = `upload?tab=${encodeURIComponent(this.tab)}&name=${encodeURIComponent(file.name)}`;
     const reply = await fetch(address, { method: "POST", body: file }).catch(() => null);
-    if (!reply) throw new Refused(`${file.name} could not be sent: the connection was lost`, "Lost");
+    if (!reply) throw new Refused(`${file.name} was not sent: the connection is interrupted`, "Lost");
     const said = await reply.json().catch(() => ({}));
     if (!reply.ok) throw new Refused(said.error || `${file.name} was refused (${reply.status})`, "BadRequest");
     return said.file;
@@ -120,4 +120,4 @@ class Link {
 Link.PAUSE = 500;       /* ms before the connection is tried again */
 Link.LONGEST = 5000;
 Link.TRIES = 2;
-Link.LATE = ["gallery", "answer"];  /* what waits for everything else: others stand before the first of these */
+Link.LATE = ["gallery", "answer"];  /* requests that wait for all others */

@@ -1,5 +1,5 @@
 "use strict";
-/* What is drawn over a robot: lost freedoms as moving arrows, the error's ellipsoid, a plane of values with its locus. */
+/* Overlays of a robot: unobserved twists as moving arrows, the error ellipsoid, a plane of values with its locus. */
 const Overlays = (() => {
 const { BEHIND, arrow, bent, cylinder, label, material, stretch, vector } = Solids;
 const SWING = 0.2, TURN = 0.42, PERIOD = 2.6;  /* characteristic lengths, rad, s */
@@ -47,7 +47,7 @@ class Motion {
   }
 }
 
-/* The arrows of lost freedoms; `swing` moves them forth and back. */
+/* The arrows of unobserved twists; `swing` moves them back and forth. */
 class LostArrows {
   constructor(records, { length, radius }) {
     this.group = new THREE.Group();
@@ -178,10 +178,10 @@ function line(points, radius, look) {
   return group;
 }
 
-/* What sensors see, as each kind draws itself: lines, and see-through polygons that the view does not fit itself to. */
+/* Observations, as each kind draws itself: lines, and see-through polygons that the view does not fit itself to. */
 function sights(records, radius) {
-  const look = material(Colours.of("watched"));
-  const sheer = new THREE.MeshBasicMaterial({ color: Colours.of("watched"), ...BEHIND, opacity: 0.22, side: THREE.DoubleSide });
+  const look = material(Colours.of("observed"));
+  const sheer = new THREE.MeshBasicMaterial({ color: Colours.of("observed"), ...BEHIND, opacity: 0.22, side: THREE.DoubleSide });
   return records.flatMap(({ lines, areas }) => [
     ...lines.map((each) => each.length > 1 ? line(each.map(vector), 0.3 * radius, look) : new THREE.Group()),
     ...areas.map((each) => {

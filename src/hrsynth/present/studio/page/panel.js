@@ -1,5 +1,5 @@
 "use strict";
-/* What all panels share: a heading, a line for what is under way or wrong, the command and the Python line. */
+/* Base of all panels: a heading, a line for progress and errors, the command and the Python line. */
 
 class Panel {
   constructor(studio, key, title) {
@@ -11,7 +11,7 @@ class Panel {
       element("h2", { textContent: title }), this.body, this.status.root, this.same.root);
   }
 
-  /* Ask about the robot as it stands; null where nothing came of it, or where meanwhile other legs are watched. */
+  /* Request an analysis of the robot as it stands; null without a result, or if other legs are observed meanwhile. */
   async ask(kind, words, fields = {}, channel = kind) {
     const { studio } = this, { robot, watch } = studio;
     const answer = await this.status.during(studio.link.ask(kind, { ...studio.asked(), ...fields }, channel), words,
@@ -19,7 +19,7 @@ class Panel {
     return robot === studio.robot && watch === studio.watch ? answer : null;
   }
 
-  /* The panel is looked at or no longer; another robot; another place; other legs; at rest; Escape. */
+  /* Events: panel shown or left; another robot; another pose; other observed legs; motion ended; Escape. */
   entered() {}
   left() {}
   opened() {}

@@ -1,15 +1,15 @@
 "use strict";
-/* What is taken away: the page, the picture, the report, the figure, the robot file. */
+/* Export: the page, the image, the report, the figure, the robot file. */
 
 class ExportPanel extends Panel {
   constructor(studio) {
     super(studio, "export", "Export");
-    const offers = [["page", "Page", "the robot in 3D with its sliders, one file that needs no network"],
-      ["report", "Report", "the derivation, step by step, to be read and printed"],
+    const offers = [["page", "Page", "the robot in 3D with sliders, one file that needs no network"],
+      ["report", "Report", "the derivation step by step, for reading and printing"],
       ["figure", "Figure", "robot and hidden robot side by side, for a paper"],
-      ["robot", "Robot file", "what was read, in hrsynth's own words"]];
+      ["robot", "Robot file", "the robot as read, in the format of hrsynth"]];
     this.body.append(element("ul", { className: "offers" },
-      this.offer("Picture", "what is seen now (PNG)", () => this.picture()),
+      this.offer("Image", "the present 3D view (PNG)", () => this.picture()),
       ...offers.map(([kind, name, words]) => this.offer(name, words, () => this.fetch(kind, name)))));
   }
 

@@ -1,5 +1,5 @@
 "use strict";
-/* Which legs are watched, and what follows: the verdict, what is lost, the hidden robot, the smallest sets. */
+/* Observed legs: the verdict, unobserved dof, the hidden robot, the smallest sets. */
 
 class LegsPanel extends Panel {
   constructor(studio) {
@@ -16,7 +16,7 @@ class LegsPanel extends Panel {
   }
 
   opened(scene) {
-    this.legs.replaceChildren(element("legend", { textContent: "Watched legs" }), ...scene.legs.map((leg) => this.row(leg)));
+    this.legs.replaceChildren(element("legend", { textContent: "Observed legs" }), ...scene.legs.map((leg) => this.row(leg)));
     this.camera.replaceChildren(this.cameras(scene));
     for (const part of [this.verdict, this.lost, this.hidden, this.sets]) part.replaceChildren();
     this.stop();
@@ -28,11 +28,11 @@ class LegsPanel extends Panel {
     const row = tick(name, watched, () => this.chosen());
     const input = row.querySelector("input");
     Object.assign(input, { value: name, disabled: !can });
-    row.append(element("small", { textContent: can ? `${words}, seen at ${link}` : `${words}: ${why}` }));
+    row.append(element("small", { textContent: can ? `${words}, observed at ${link}` : `${words}: ${why}` }));
     return row;
   }
 
-  /* The link that carries the camera: another one is another question from the start. */
+  /* The link that carries the camera: a change opens the robot anew. */
   cameras({ machines: [{ links }] }) {
     const { studio } = this, [base, ...others] = links;
     return choice("The camera is on", [["", base], ...others.map((link) => [link, link])], studio.camera ?? "",
@@ -41,7 +41,7 @@ class LegsPanel extends Panel {
 
   boxes() { return [...this.legs.querySelectorAll("input")]; }
 
-  /* A leg is ticked, or clicked in the picture. */
+  /* A leg is ticked, or clicked in the 3D view. */
   chosen() {
     const names = this.boxes().filter(({ checked }) => checked).map(({ value }) => value);
     this.studio.rewatch(names);
@@ -57,7 +57,7 @@ class LegsPanel extends Panel {
     this.refresh();
   }
 
-  /* Elsewhere other freedoms may be lost: asked when it is looked at. */
+  /* The unobserved dof depend on the pose: requested when the panel is shown. */
   settled() {
     this.stale = true;
     this.entered();
@@ -81,21 +81,21 @@ class LegsPanel extends Panel {
     this.verdict.className = `verdict ${!good ? "bad" : rank < dof ? "elsewhere" : "good"}`;
     this.verdict.replaceChildren(
       element("p", { className: "head" }, element("b", { textContent: verdict.words })), line(verdict.certainty.replace(`${verdict.words}, `, "")) ?? "",
-      line(`Here ${rank} of ${dof} freedoms are seen${here ? `: ${here}` : ""}.`, { className: good && rank < dof ? "wrong" : "" }), ...[line(error?.words)].filter(Boolean));
-    const head = lost.length ? [element("h3", { textContent: lost.length > 1 ? "Lost freedoms" : "Lost freedom" })] : [];
+      line(`At this pose ${rank} of ${dof} dof are observed${here ? `: ${here}` : ""}.`, { className: good && rank < dof ? "wrong" : "" }), ...[line(error?.words)].filter(Boolean));
+    const head = lost.length ? [element("h3", { textContent: "Unobserved dof" })] : [];
     this.lost.replaceChildren(...head, ...lost.map(({ words }, i) =>
       element("div", { className: "row" }, element("span", { textContent: words }), button("Play", () => this.play(i), { "aria-label": `Play: ${words}` }))));
     this.hidden.replaceChildren(...(hidden ? [element("h3", { textContent: "Hidden robot" }), line(hidden)] : []),
-      ...(condition ? [element("h3", { textContent: "Where a freedom is lost (Type 2)" }), line(condition)] : []));
+      ...(condition ? [element("h3", { textContent: "Type 2 singularities" }), line(condition)] : []));
     this.sets.replaceChildren(...(sets?.length ? [element("h3", { textContent: "Smallest sets of legs" })] : []),
       ...(sets || []).map(({ legs, words }) => element("div", { className: "row" },
-        button(legs.join(", "), () => this.studio.rewatch(legs), { "aria-label": `Watch ${legs.join(", ")}` }), element("span", { textContent: words }))),
-      ...[line(more ? `and ${more} more, which the command legs lists` : "")].filter(Boolean));
+        button(legs.join(", "), () => this.studio.rewatch(legs), { "aria-label": `Observe ${legs.join(", ")}` }), element("span", { textContent: words }))),
+      ...[line(more ? `and ${more} more; the command legs lists all` : "")].filter(Boolean));
   }
 
   async play(index) {
     this.stop();
-    const found = await this.ask("play", "Following the lost freedom", { lost: index, hidden: this.studio.sees });
+    const found = await this.ask("play", "Moving along the unobserved twist", { lost: index, hidden: this.studio.sees });
     if (!found) return;
     this.played.textContent = found.words;
     this.player.load(found.frames, LegsPanel.SECONDS);
@@ -122,4 +122,4 @@ class LegsPanel extends Panel {
     this.studio.stage.ellipsoid(null);
   }
 }
-LegsPanel.SECONDS = 3;  /* how long a lost freedom is played, there and back */
+LegsPanel.SECONDS = 3;  /* duration of the motion along an unobserved twist, back and forth */

@@ -1,22 +1,25 @@
 "use strict";
-/* The other poses at which the watched legs look the same: listed, drawn as outlines, flown to. */
+/* Assembly modes: listed, drawn as outlines, flown to. */
 
 class ModesPanel extends Panel {
   constructor(studio) {
     super(studio, "modes", "Modes");
-    this.find = button("Find them from here", () => this.refresh());
+    this.find = button("Find modes of this pose", () => this.refresh());
+    this.drawn = tick("Draw their outlines", false, () => this.draw());
     this.words = element("p");
     this.list = element("ol", { className: "modes" });
-    this.back = button("Back to where I was", () => this.return(), { hidden: true });
-    this.join = button("Which of them lie in one aspect?", () => this.group(), { hidden: true });
+    this.back = button("Back to the previous pose", () => this.return(), { hidden: true });
+    this.join = button("Group by aspect", () => this.group(), { hidden: true });
     this.aspects = element("div", { "aria-live": "polite" });
-    this.body.append(element("p", { textContent: "Poses that look the same to the camera: the controller may end at any of them." }),
-      element("div", { className: "row" }, this.find, this.back), this.words, this.list, this.join, this.aspects);
+    this.body.append(element("p", { textContent: "Poses with the same observed directions: the loop may stop at any of them." }),
+      element("div", { className: "row" }, this.find, this.drawn, this.back), this.words, this.list, this.join, this.aspects);
     this.outlines = [];
   }
 
   opened({ kept }) {
     this.find.hidden = this.kept = Boolean(kept);
+    this.drawn.hidden = Boolean(this.studio.tabs);
+    this.drawn.querySelector("input").checked = false;
     this.anew();
   }
 
@@ -27,20 +30,20 @@ class ModesPanel extends Panel {
     if (this.studio.isShown(this.key)) this.entered();
   }
 
-  /* A page that was saved knows those of home, and shows them there. */
+  /* A saved page has the modes of the zero configuration, and shows them there. */
   moved({ here }) {
     if (!this.kept) return;
-    this.words.textContent = here ? "They are shown at home." : "";
-    this.studio.stage.ghosts(here ? [] : this.outlines);
+    this.words.textContent = here ? "Shown at the zero configuration only." : "";
+    this.studio.stage.ghosts(here ? [] : this.ghosts);
     this.studio.relegend();
   }
 
-  /* Other poses from here are other modes: those that are listed belong to where they were asked. */
+  /* Another pose has other modes: a list belongs to the pose of its request. */
   settled() {
     if (this.kept) return;
     const away = (values) => values?.some((value, i) => Math.abs(value - this.studio.values[i]) > 1e-6);
     if (this.flown) this.flown.to ??= this.studio.values;
-    if (this.flown ? away(this.flown.to) : away(this.origin)) this.words.textContent = "These belong to an earlier pose. Find them again.";
+    if (this.flown ? away(this.flown.to) : away(this.origin)) this.words.textContent = "These modes belong to an earlier pose. Find them again.";
   }
 
   forget() {
@@ -71,7 +74,7 @@ class ModesPanel extends Panel {
 
   /* Modes in one aspect: a path without singularity leads from one to the other. */
   async group() {
-    const found = await this.ask("aspects", "Looking for paths without singularity", { here: this.start });
+    const found = await this.ask("aspects", "Searching for paths without singularity", { here: this.start });
     if (!found) return;
     const current = this.list.querySelector("[aria-current=true]")?.dataset.label?.replace(/,.*/, "");
     this.outlines = this.outlines.map((mode, i) => {
@@ -112,9 +115,12 @@ class ModesPanel extends Panel {
     for (const row of this.list.children) row.setAttribute("aria-current", row.dataset.label === label);
   }
 
+  /* A view without panels draws outlines on request only. */
+  get ghosts() { return this.studio.tabs || this.drawn.querySelector("input").checked ? this.outlines : []; }
+
   draw() {
     if (!this.studio.isShown(this.key)) return;
-    this.studio.stage.ghosts(this.outlines);
+    this.studio.stage.ghosts(this.ghosts);
     this.studio.stage.onghost = (label) => { const mode = this.outlines.find((each) => each.label === label); if (mode?.here) this.fly(mode); };
     this.studio.refit();
   }

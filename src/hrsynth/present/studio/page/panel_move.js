@@ -1,5 +1,5 @@
 "use strict";
-/* The platform is moved by a slider for each of its freedoms, or dragged in the picture. */
+/* Motion of the platform: a slider for each dof, or dragging in the 3D view. */
 
 class MovePanel extends Panel {
   constructor(studio) {
@@ -7,8 +7,8 @@ class MovePanel extends Panel {
     this.sliders = [];
     this.list = element("div", { className: "sliders" });
     this.notes = element("ul", { className: "notes" });
-    this.drag = tick("Drag the platform in the picture", false, (on) => this.grip(on));
-    this.body.append(this.list, element("div", { className: "row" }, button("Home", () => this.home()), this.drag), this.notes);
+    this.drag = tick("Drag the platform in the 3D view", false, (on) => this.grip(on));
+    this.body.append(this.list, element("div", { className: "row" }, button("Zero configuration", () => this.home()), this.drag), this.notes);
   }
 
   opened(scene) {
@@ -35,11 +35,11 @@ class MovePanel extends Panel {
     this.studio.stage.gizmo(on, this.studio.state, (place) => this.studio.move({ platform: place }));
   }
 
-  /* While a slider is held its own value stays; at rest all show what was reached. */
+  /* A slider that is dragged keeps its value; afterwards all show the reached values. */
   moved(answer) {
     if (this.studio.moving) return;
     this.sliders.forEach((slider, i) => slider.read(this.studio.values[i]));
-    if (answer.stopped) this.status.say("The robot goes no further that way.");
+    if (answer.stopped) this.status.say("Limit reached: no further motion in this direction.");
     else this.status.clear();
     if (answer.command) this.same.show(answer);
   }

@@ -1,5 +1,5 @@
 "use strict";
-/* Accuracy and singularities on a plane through the workspace, which is moved along its normal. */
+/* Accuracy and singularities on a plane through the workspace, movable along its normal. */
 
 class PlanePanel extends Panel {
   constructor(studio) {
@@ -30,13 +30,13 @@ class PlanePanel extends Panel {
     this.draw();
   }
 
-  /* Other legs see otherwise. */
+  /* Other legs, other values. */
   rewatched() { this.anew(this.record); }
 
-  /* The coordinates that the plane neither spans nor is drawn along are held where the platform is. */
+  /* The coordinates that the plane neither spans nor is moved along are fixed at the present pose. */
   settled() { this.anew(this.record && String(this.record.held) !== String(this.held())); }
 
-  /* A plane of other legs or of another pose is not shown: it is asked for again, as soon as it is looked at. */
+  /* A plane of other legs or of another pose is removed, and requested again when the panel is shown. */
   anew(needed) {
     if (!needed) return;
     this.forget();
@@ -51,7 +51,7 @@ class PlanePanel extends Panel {
 
   layout(pairs) {
     this.controls.replaceChildren(
-      choice("Shown", [["accuracy", "error of the platform per 0.1°"], ["distance", "distance to a singularity (smallest singular value)"]], this.kind, (kind) => { this.kind = kind; this.forget(); this.refresh(); }),
+      choice("Shown", [["accuracy", "error of the platform per 0.1°"], ["distance", "singularity distance (smallest singular value of Mᵀ)"]], this.kind, (kind) => { this.kind = kind; this.forget(); this.refresh(); }),
       choice("Plane of", pairs, this.of, (of) => { this.of = of; this.layout(pairs); this.forget(); this.refresh(); }));
     const third = this.ways.find(({ name }) => !this.of?.includes(name));
     this.at = null;
@@ -76,11 +76,11 @@ class PlanePanel extends Panel {
     this.seen = fields.of;
   }
 
-  /* What the plane's colours stand for. */
+  /* The values of the plane's colours. */
   thresholds({ steps, unit, falling }) {
     const edges = falling ? [...steps].reverse() : steps, last = edges.length, sign = unit === "deg" ? "°" : unit && ` ${unit}`;
     const range = (k) => falling ? (k === 0 ? `more than ${edges[0]}` : k === last ? `up to ${edges[last - 1]}: singular, or nearly` : `${edges[k]} to ${edges[k - 1]}`)
-      : (k === 0 ? `up to ${edges[0]}${sign}` : k === last ? `more than ${edges[last - 1]}${sign}, or a freedom is lost` : `${edges[k - 1]} to ${edges[k]}${sign}`);
+      : (k === 0 ? `up to ${edges[0]}${sign}` : k === last ? `more than ${edges[last - 1]}${sign}, or singular` : `${edges[k - 1]} to ${edges[k]}${sign}`);
     this.scale.replaceChildren(...Colours.steps.map((colour, k) => {
       const swatch = element("i", { "aria-hidden": "true" });
       swatch.style.background = colour;
@@ -88,7 +88,7 @@ class PlanePanel extends Panel {
     }));
   }
 
-  /* The stage tells where the plane was dragged to. */
+  /* The stage reports the new position of the plane. */
   draw() {
     if (!this.studio.isShown(this.key)) return;
     this.studio.stage.plane(this.record, (at) => { this.at?.read(at); this.refresh(); });

@@ -1,5 +1,5 @@
 "use strict";
-/* Which robot: a gallery of the shipped ones, the files of the folder, a file of one's own; and what was guessed. */
+/* Choice of the robot: the gallery, the files of the folder, dropped files; assumptions of reading them. */
 
 class RobotPanel extends Panel {
   constructor(studio) {
@@ -28,7 +28,7 @@ class RobotPanel extends Panel {
 
   /* The gallery, and the files of the folder. */
   async fill() {
-    const found = await this.ask("gallery", "Looking for robots");
+    const found = await this.ask("gallery", "Searching for robots");
     if (!found) return;
     this.gallery.replaceChildren(...found.robots.map((robot) => this.card(robot)));
     this.folder = found.files;
@@ -55,11 +55,11 @@ class RobotPanel extends Panel {
       each.setAttribute("aria-current", each.dataset.source === this.studio.robot?.source);
   }
 
-  /* Send files, and open the first that may be a robot. */
+  /* Upload files, and open the first that may be a robot. */
   async take(files) {
     const names = [];
     for (const file of files) {
-      const name = await this.status.during(this.studio.link.upload(file), `Sending ${file.name}`);
+      const name = await this.status.during(this.studio.link.upload(file), `Uploading ${file.name}`);
       if (!name) return;
       this.mine.set(name, file);
       names.push(name);
@@ -67,10 +67,10 @@ class RobotPanel extends Panel {
     this.list();
     const robots = names.filter(RobotPanel.isRobot), robot = robots.find((name) => !/ya?ml$/i.test(name)) ?? robots[0];
     if (robot) await this.studio.open({ source: `file:${robot}`, options: {} });
-    else if (names.length) this.status.say(`${names.join(", ")}: kept for the robot file that names ${names.length > 1 ? "them" : "it"}.`);
+    else if (names.length) this.status.say(`${names.join(", ")}: stored for the robot file that names ${names.length > 1 ? "them" : "it"}.`);
   }
 
-  /* After a break the server has a new folder for this tab: what was dropped in goes there again. */
+  /* After an interruption the server has a new folder for this tab: dropped files are sent again. */
   async again() {
     for (const file of this.mine.values()) await this.studio.link.upload(file).catch((error) => this.status.fail(error.message));
   }
@@ -82,7 +82,7 @@ class RobotPanel extends Panel {
     this.mark();
   }
 
-  /* A file of which no robot could be made: why, and what may be chosen otherwise. */
+  /* A file that makes no robot: the reason, and the assumptions that can be changed. */
   failed(record, robot) {
     if (!record) return;
     this.studio.show("robot");
@@ -90,16 +90,16 @@ class RobotPanel extends Panel {
     this.status.fail(`${record.name}: ${record.failed}`);
   }
 
-  /* What the file leaves open: shown at once where somebody has just brought the file. */
+  /* The assumptions of reading a file: open if the file was just added. */
   guessed({ guesses, dialect, failed }, robot) {
     this.guesses.hidden = !guesses?.length;
     this.guesses.open = Boolean(failed) || /^(file|folder):/.test(robot.source);
-    this.guesses.replaceChildren(element("summary", { textContent: `What was read into the file (${dialect})` }),
-      element("p", { textContent: "Change what is wrong here: the robot is then opened again." }),
+    this.guesses.replaceChildren(element("summary", { textContent: `Assumptions of reading the file (${dialect})` }),
+      element("p", { textContent: "Change an entry that is wrong; the robot is then read again." }),
       ...(guesses || []).map((guess) => this.guess(guess, robot)));
   }
 
-  /* What was guessed: another choice opens the robot anew with it. */
+  /* An assumption: another choice opens the robot anew. */
   guess({ name, found, why, candidates }, robot) {
     const id = fresh("why"), now = JSON.stringify(found);
     const words = (value) => (value === true ? "yes" : value === false ? "no" : Array.isArray(value) ? value.join(", ") || "none" : String(value));

@@ -1,5 +1,5 @@
 "use strict";
-/* A servo run from a start to a goal, played, with the picture of the camera beside it. */
+/* A servo run from a start to a goal, played, with the camera image beside it. */
 
 class ServoPanel extends Panel {
   constructor(studio) {
@@ -11,7 +11,7 @@ class ServoPanel extends Panel {
     this.picture = new CameraPicture();
     this.words = element("p", { "aria-live": "polite" });
     this.now = element("p", { className: "numbers" });
-    this.body.append(element("p", { textContent: "Move the platform (or fly to a mode), then set where the run starts and where it should end." }),
+    this.body.append(element("p", { textContent: "Move the platform (or fly to a mode), then set start and goal of the run." }),
       this.places, element("div", { className: "row" }, this.run), this.words, this.player.root, this.now, this.picture.root);
   }
 
@@ -37,7 +37,7 @@ class ServoPanel extends Panel {
 
   end(key) {
     const kept = this.ends[key], sliders = this.studio.scene.sliders;
-    const said = kept ? sliders.map(({ label, unit }, i) => `${label} ${written(kept.values[i], unit)}`).join(", ") : key === "start" ? "home" : "not set";
+    const said = kept ? sliders.map(({ label, unit }, i) => `${label} ${written(kept.values[i], unit)}`).join(", ") : key === "start" ? "zero configuration" : "not set";
     const root = element("div", { className: "row" }, element("span", { textContent: `${key === "start" ? "Start" : "Goal"}: ${said}` }),
       button("Set here", () => this.set(key), { "aria-label": `Set here: the ${key}` }));
     if (kept) root.append(button("Go there", () => this.studio.fly(null, kept.here), { "aria-label": `Go there: the ${key}` }));
@@ -54,7 +54,7 @@ class ServoPanel extends Panel {
 
   async go() {
     this.clear();
-    const found = await this.ask("servo", "Running the loop", { here: this.ends.start?.here ?? null, goal: this.ends.goal.values, end: this.ends.goal.here, hidden: this.studio.sees });
+    const found = await this.ask("servo", "Simulating the loop", { here: this.ends.start?.here ?? null, goal: this.ends.goal.values, end: this.ends.goal.here, hidden: this.studio.sees });
     if (!found) return;
     this.found = found;
     this.words.textContent = found.words;
@@ -83,14 +83,14 @@ class ServoPanel extends Panel {
 }
 ServoPanel.SECONDS = 5;
 
-/* What the camera sees: the watched legs as lines, where they are to come to dashed. */
+/* Camera image: the observed legs as lines, their desired position dashed. */
 class CameraPicture {
   constructor() {
     this.svg = document.createElementNS(CameraPicture.SVG, "svg");
     this.svg.setAttribute("role", "img");
-    this.svg.setAttribute("aria-label", "The camera's picture: watched legs solid, where they should end up dashed");
+    this.svg.setAttribute("aria-label", "Camera image: observed legs solid, at the goal dashed");
     this.root = element("figure", { className: "camera", hidden: true }, this.svg,
-      element("figcaption", { textContent: "The camera's picture. Dashed: where the legs should end up." }));
+      element("figcaption", { textContent: "Camera image. Dashed: observed legs at the goal." }));
   }
 
   clear() { this.root.hidden = true; }

@@ -1,9 +1,9 @@
 "use strict";
-/* What each camera sees, in its plane z = 1: x to the right, y down, as far as its picture goes. */
+/* Image of each camera, in its plane z = 1: x to the right, y down. */
 
 class SightsPanel extends Panel {
   constructor(studio) {
-    super(studio, "sights", "Pictures");
+    super(studio, "sights", "Images");
     this.root.hidden = true;
   }
 
@@ -11,7 +11,7 @@ class SightsPanel extends Panel {
     this.root.hidden = !cameras.length;
     this.pictures = cameras.map(({ name, half }) => {
       const canvas = element("canvas", { role: "img", width: 520, height: Math.round(520 * half[1] / half[0]) });
-      this.body.append(element("figure", { className: "camera" }, canvas, element("figcaption", { textContent: `seen by ${name}` })));
+      this.body.append(element("figure", { className: "camera" }, canvas, element("figcaption", { textContent: `image of ${name}` })));
       return { name, canvas, scale: canvas.width / 2 / half[0] };
     });
     this.moved({ state });
@@ -20,7 +20,7 @@ class SightsPanel extends Panel {
   moved({ state }) { this.pictures.forEach((each, i) => this.draw(each, (state.sights ?? []).filter(({ camera, image }) => camera === i && image.length))); }
 
   draw({ name, canvas, scale }, sights) {
-    const { width, height } = canvas, pen = canvas.getContext("2d"), colour = Colours.of("watched");
+    const { width, height } = canvas, pen = canvas.getContext("2d"), colour = Colours.of("observed");
     const place = ([x, y]) => [width / 2 + scale * x, height / 2 + scale * y];
     pen.clearRect(0, 0, width, height);
     Object.assign(pen, { strokeStyle: Colours.of("leg"), lineWidth: 1 });
@@ -35,6 +35,6 @@ class SightsPanel extends Panel {
       points.length === 1 ? pen.fill() : pen.stroke();
       if (i === 0) pen.fillText(what, middle[0] + 12, middle[1] - 10);
     }
-    canvas.setAttribute("aria-label", `Picture of ${name}: ${sights.map(({ name: what }) => what).join(", ") || "nothing of what is observed"}`);
+    canvas.setAttribute("aria-label", `Image of ${name}: ${sights.map(({ name: what }) => what).join(", ") || "no observation visible"}`);
   }
 }

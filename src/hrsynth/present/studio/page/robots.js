@@ -94,13 +94,13 @@ function outline(record, places, colour, { opacity = 0.3, name = null, size = 0,
   return group;
 }
 
-/* The arrow of a leg's direction, with the leg's name: strong where it is watched. It follows its link. */
+/* The arrow of a leg's direction, with the leg's name: strong if it is observed. It follows its link. */
 class Direction {
   constructor(record, { length, radius }) {
     this.record = record;
     this.group = new THREE.Group();
     this.make = (watched) => {
-      const ends = record.ends.map(vector), colour = Colours.of(watched ? "watched" : "unwatched");
+      const ends = record.ends.map(vector), colour = Colours.of(watched ? "observed" : "unobserved");
       const name = label(record.leg, colour, (watched ? 0.14 : 0.11) * length);
       name.position.copy(ends[1]).lerp(ends[0], 0.85);
       const look = material(colour, watched ? {} : { transparent: true, opacity: 0.75 });

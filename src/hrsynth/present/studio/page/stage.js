@@ -7,8 +7,8 @@ const { clear, label, turn, vector } = Solids;
 const { Machine, Direction, outline } = Robots;
 const { LostArrows, Plane, ellipsoid, sights } = Overlays;
 const CLICK = 6, NEAR = { mouse: 7, pen: 10, touch: 18 }, ASK_EACH = 120, SAME = 1e-3;  /* px, px, ms, rad or characteristic lengths */
-const NO_WEBGL = "The 3D picture needs WebGL 2, which this browser does not provide: all text and numbers are still there.";
-const LOST = "The graphics context was lost; the picture comes back with it.";
+const NO_WEBGL = "The 3D view needs WebGL 2, which this browser does not provide: all text and numbers are still available.";
+const LOST = "The graphics context was lost; the 3D view returns with it.";
 
 return class Stage {
   /* `reduced`: nothing moves by itself; `over`: elements that lie on the pane's top or bottom, where nothing is to be seen. */
@@ -45,7 +45,7 @@ return class Stage {
     new ResizeObserver(() => this.resize()).observe(parent);
   }
 
-  /* One line where the picture would be. */
+  /* One line in place of the 3D view. */
   tell(words) {
     this.line?.remove();
     if (words) this.parent.append(this.line = Object.assign(document.createElement("p"), { textContent: words, className: "broken" }));
@@ -68,7 +68,7 @@ return class Stage {
       this.sides[side].add(arrow.group);
       return arrow;
     }));
-    this.canvas.setAttribute("aria-label", `Picture of ${record.name ?? "the robot"}; arrow keys turn it, plus and minus move closer and away, Home shows all.`);
+    this.canvas.setAttribute("aria-label", `3D view of ${record.name ?? "the robot"}; arrow keys rotate it, plus and minus zoom, Home shows all.`);
     if (record.state) this.state(record.state);
     this.sight.look(record.normal);
     this.layout(this.mode);
@@ -155,7 +155,7 @@ return class Stage {
     }
   }
 
-  /* The watched legs by their names; the arrows of the others are pale. */
+  /* The observed legs by their names; the arrows of the others are pale. */
   watch(names) {
     this.arrows.forEach((each) => each.watch(names.includes(each.record.leg)));
     this.dirty();
@@ -174,7 +174,7 @@ return class Stage {
     this.arrange();
   }
 
-  /* Whether the robot stands as an outline shows it, as far as the picture can tell. */
+  /* Whether the robot stands as an outline shows it, as far as visible. */
   isHere(places) {
     const now = this.machines.real.places;
     return Boolean(now) && places.every((place, i) => !place
@@ -188,7 +188,7 @@ return class Stage {
     this.dirty();
   }
 
-  /* Lost freedoms (twists of points) as arrows that move forth and back, still where motion is reduced. */
+  /* Unobserved twists as arrows that move back and forth, still if motion is reduced. */
   lost(records) {
     clear(this.parts.lost);
     this.arrowsOfLost = records.length ? new LostArrows(records, this.record) : null;
@@ -248,8 +248,8 @@ return class Stage {
     const roles = new Set(shown.flatMap((each) => [...each.roles()]));
     const keys = ["base", "leg", "joint", "motor", "virtual", "actuator"].filter((role) => roles.has(role));
     const seen = this.arrows.filter(({ group }) => group.visible);
-    if (seen.some(({ watched }) => watched) || this.parts.sights.children.length) keys.push("watched");
-    if (seen.some(({ watched }) => !watched)) keys.push("unwatched");
+    if (seen.some(({ watched }) => watched) || this.parts.sights.children.length) keys.push("observed");
+    if (seen.some(({ watched }) => !watched)) keys.push("unobserved");
     if (this.parts.ghosts.children.some(({ visible }) => visible)) keys.push("mode");
     if (this.parts.goal.children.length) keys.push("goal");
     if (shown.length) keys.push("frame");
@@ -261,19 +261,19 @@ return class Stage {
     return [...keys, ...scale].map((key) => ({ key, colour: Colours.of(key), words: this.words(key), now: roles.has("platform") && key === step }));
   }
 
-  /* What a colour means here: the scale with its thresholds, the ellipsoid with how large it is drawn. */
+  /* Label of a colour: the scale with its thresholds, the ellipsoid with its magnification. */
   words(key) {
     const { names, edges, unit } = this.record.scale ?? {};
-    if (key === "watched" && this.parts.sights.children.length) return "what is observed, and cameras";
+    if (key === "observed" && this.parts.sights.children.length) return "observations and cameras";
     if (key === "ellipsoid") return `${Colours.words(key)} for 0.1°${this.factor > 1 ? `, drawn ${this.factor} times as large` : ""}`;
     if (!names || !key.startsWith("step")) return Colours.words(key);
     const step = Number(key.slice(4)), sign = unit === "deg" ? "°" : ` ${unit}`, { falling, steps } = this.sheet?.record ?? {};
     const range = (k, e) => k === 0 ? `up to ${e[0]}` : k === e.length ? `more than ${e[k - 1]}` : `${e[k - 1]} to ${e[k]}`;
-    return `${names[step]}: ${range(step, edges)}${sign} per 0.1°${step === edges.length ? ", or a freedom is lost" : ""}`
-      + (falling ? `; distance on the plane ${range(steps.length - step, steps)}` : "");
+    return `${names[step]}: ${range(step, edges)}${sign} per 0.1°${step === edges.length ? ", or singular" : ""}`
+      + (falling ? `; singularity distance on the plane ${range(steps.length - step, steps)}` : "");
   }
 
-  /* The picture as a PNG blob, null where there is no WebGL. */
+  /* The 3D view as a PNG blob, null without WebGL. */
   picture() {
     if (!this.renderer) return Promise.resolve(null);
     this.draw(Colours.of("background"));
@@ -304,7 +304,7 @@ return class Stage {
     this.dirty();
   }
 
-  /* Draw once, with the browser's next picture. */
+  /* Draw once, with the browser's next frame. */
   dirty() {
     if (this.renderer && !this.asked) this.asked = requestAnimationFrame((time) => { this.asked = 0; this.draw(null, time); });
   }

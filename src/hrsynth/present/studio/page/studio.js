@@ -1,5 +1,5 @@
 "use strict";
-/* The page: which robot, which legs, where it stands; panels ask and show, the stage draws. */
+/* The page: robot, observed legs, configuration; panels request and show, the stage draws. */
 
 const $ = (id) => document.getElementById(id);
 
@@ -31,10 +31,10 @@ class Studio {
 
   ready() { requestAnimationFrame(() => { document.body.dataset.ready = "yes"; }); }
 
-  /* The connection is gone; it is back, with an empty folder for this tab. */
+  /* The connection is interrupted; it is back, with an empty folder for this tab. */
   lost(refused) {
     $("lost-link").hidden = false;
-    $("lost-link").textContent = refused || "The connection to hrsynth is lost. Trying again … If you have stopped it, start it again and open the address that it prints.";
+    $("lost-link").textContent = refused || "The connection to hrsynth is interrupted. Reconnecting … If you have stopped it, start it again and open the address that it prints.";
   }
 
   async back() {
@@ -51,12 +51,12 @@ class Studio {
 
   say(words) { $("said").textContent = words; }
 
-  /* What each ask carries. */
+  /* Fields of each request. */
   asked() {
     return { robot: this.robot, watch: this.seen, camera: this.camera, here: this.here };
   }
 
-  /* What is watched, as it is asked for: by legs, or by the links that were named when the robot was opened. */
+  /* Observed legs in requests: by legs, or by the links that were named when the robot was opened. */
   get seen() {
     return this.named ?? this.watch?.map((name) => this.scene.legs.find((leg) => leg.name === name)?.ask ?? name);
   }
@@ -103,17 +103,17 @@ class Studio {
     this.arrange("overlay");
   }
 
-  /* A robot that could not be opened: what was shown stays, and so does what the panel says of it. */
+  /* A robot that could not be opened: the present one stays, with its panel. */
   kept() {
     if (this.scene) this.panels.robot?.opened(this.scene);
-    else { this.show("robot"); $("answer").textContent = "Pick a robot, or drop a robot file in."; }
+    else { this.show("robot"); $("answer").textContent = "Choose a robot, or drop a robot file onto the page."; }
   }
 
-  /* The plain answer, on top. */
+  /* The summary, on top. */
   async answer() {
     if (!this.panels.robot) return;
     const { robot } = this;
-    $("answer").textContent = "Working out which legs to watch …";
+    $("answer").textContent = "Computing which legs to observe …";
     $("answer-actions").replaceChildren();
     const found = await this.link.ask("answer", { robot, camera: this.camera }).catch((error) => ({ sentences: [error.message] }));
     if (!found || robot !== this.robot) return;
@@ -121,10 +121,10 @@ class Studio {
     if (!found.watch?.length) return;
     const same = new Same();
     same.show(found);
-    $("answer-actions").replaceChildren(button(`Watch ${found.watch.join(", ")}`, () => this.rewatch(found.watch), { className: "small" }), same.root);
+    $("answer-actions").replaceChildren(button(`Observe ${found.watch.join(", ")}`, () => this.rewatch(found.watch), { className: "small" }), same.root);
   }
 
-  /* Move the platform; each answer is drawn, and what stands still for a moment has settled. */
+  /* Move the platform; each answer is drawn; without a move for a moment, it has settled. */
   async move(fields) {
     this.pending += 1;
     this.moving = true;
@@ -145,13 +145,13 @@ class Studio {
     if (!this.moving && String(this.values) !== this.settled) this.rest = setTimeout(() => this.settle(), Studio.REST);
   }
 
-  /* At rest somewhere else than before: what depends on the pose is asked anew. */
+  /* Settled at another pose: results that depend on it are requested anew. */
   settle() {
     this.settled = String(this.values);
     this.each("settled");
   }
 
-  /* Go to a configuration that is known, seen on the way unless motion is to be reduced. */
+  /* Go to a known configuration, animated unless motion is reduced. */
   async fly(places, here) {
     this.here = here;
     if (places && !this.reduced) await this.glide(this.state, { ...this.state, real: places });
@@ -178,7 +178,7 @@ class Studio {
     this.each("rewatched", names);
   }
 
-  /* How wrong the platform can be here: nothing is known of other legs until they are asked about. */
+  /* Error of the platform here: unknown for other legs until it is requested. */
   judge(error) {
     this.state = { ...this.state, error };
     this.draw(this.state);
@@ -186,7 +186,7 @@ class Studio {
 
   draw(state) {
     this.stage.state(state);
-    const beyond = state.beyond?.length ? `beyond its limits: ${state.beyond.join(", ")}` : "";
+    const beyond = state.beyond?.length ? `beyond joint limits: ${state.beyond.join(", ")}` : "";
     const away = this.tabs || state.distance === null ? "" : `smallest singular value of Mᵀ ${state.distance?.toPrecision(3)}`;
     $("now").textContent = [state.error?.words, away, beyond].filter(Boolean).join("; ");
     $("now").hidden = !$("now").textContent;
@@ -197,25 +197,25 @@ class Studio {
   tools() {
     const layouts = [["real", "Robot"], ["hidden", "Hidden robot"], ["overlay", "Both, overlaid"], ["beside", "Side by side"]];
     this.layouts = radios("Shown", layouts, "real", (layout) => this.arrange(layout));
-    $("tools").append(this.layouts, button("Fit", () => this.stage.fit(), { "aria-label": "Fit the robot into the picture" }));
+    $("tools").append(this.layouts, button("Fit", () => this.stage.fit(), { "aria-label": "Fit the robot into the view" }));
     this.hasHidden(false);
   }
 
-  /* Another hidden robot (null: none): where the one before it was says nothing of it. */
+  /* Another hidden robot (null: none): its configuration is unknown. */
   rehide(record) {
     this.state = { ...this.state, hidden: null };
     this.stage.hidden(record);
     this.hasHidden(Boolean(record));
   }
 
-  /* Whether there is a hidden robot to be shown; what was chosen stays chosen. */
+  /* Enable the layouts with a hidden robot if there is one; the choice stays. */
   hasHidden(there) {
     this.layouts.querySelectorAll("input").forEach((input) => { input.disabled = !there && input.value !== "real"; });
     if (there && this.sees) this.arrange(this.layout);
     else if (!there) this.stage.layout("real");
   }
 
-  /* The hidden robot's places come with the next state; then all of it is brought into sight. */
+  /* The hidden robot's poses come with the next state; then the view is fitted. */
   async arrange(layout) {
     this.layout = layout;
     this.sees = layout !== "real";
@@ -225,7 +225,7 @@ class Studio {
     this.relegend();
   }
 
-  /* All of what has come or gone is seen, unless somebody has turned the view. */
+  /* Fit the view to what was added or removed, unless it was rotated by hand. */
   refit() {
     if (!this.stage.sight?.turned) this.stage.fit();
     this.relegend();
@@ -241,7 +241,7 @@ class Studio {
     $("legend").hidden = !entries.length;
   }
 
-  /* Escape: what plays stops, what is asked for in the panel that is seen is cancelled. */
+  /* Escape: playback stops, the request of the visible panel is cancelled. */
   stop() {
     for (const panel of Object.values(this.panels || {})) if (this.isShown(panel.key)) {
       panel.stop();
@@ -249,10 +249,10 @@ class Studio {
     }
   }
 }
-Studio.REST = 300;    /* ms without a move after which the robot is at rest */
+Studio.REST = 300;    /* ms without a move after which the robot has settled */
 Studio.FLIGHT = 600;  /* ms of a flight to another mode */
 
-/* A place (position, quaternion) between two others. */
+/* A displacement (position, quaternion) between two others. */
 function between(from, to, part) {
   const near = from.slice(3).reduce((sum, value, i) => sum + value * to[3 + i], 0) < 0 ? -1 : 1;
   const mixed = from.map((value, i) => (1 - part) * value + part * (i < 3 ? to[i] : near * to[i]));
@@ -263,5 +263,5 @@ function between(from, to, part) {
 try {
   window.studio = new Studio();
 } catch (error) {
-  $("pane").append(element("p", { className: "broken", textContent: `The picture needs WebGL: ${error.message}` }));
+  $("pane").append(element("p", { className: "broken", textContent: `The 3D view needs WebGL: ${error.message}` }));
 }
