@@ -139,7 +139,7 @@ def chains(catalog: Catalog) -> str:
     """Verdicts of robots with equal legs, by the letters of the leg."""
     by: dict[tuple[str, str], Counter[str]] = {}
     for each in studied(catalog):
-        word = parse(each["word"])
+        word = parse(each["key"])
         letters = {"".join(joint.letter for joint in leg.joints) for leg in word.legs}
         if len(letters) == 1:
             by.setdefault((each["group"], *letters), Counter())[each["verdict"]] += 1
@@ -155,7 +155,7 @@ def cures(catalog: Catalog) -> str:
     found: Counter[str] = Counter()
     for each in studied(catalog):
         if each["verdict"] != CONTROLLABLE:
-            text = each["cure"]
+            text = each["suggestion"]
             known = not text.startswith(("none", "not all"))
             found[str(text.count(" and ") + 1) if known else "none of up to four was found"] += 1
     return table(("further measurements", "architectures"), [(key, f"{n:,}") for key, n in sorted(found.items())], 1)
@@ -172,12 +172,12 @@ def rules(catalog: Catalog) -> str:
     rows = [
         (
             "planar: rank of the lines of instantaneous centres",
-            agree(planar_rank(parse(each["word"])) == each["rank"] for each in every if each["group"] == "planar"),
+            agree(planar_rank(parse(each["key"])) == each["rank"] for each in every if each["group"] == "planar"),
         ),
         (
             "deltas: P not all parallel, at least dof/2 legs",
             agree(
-                delta_controllable(parse(each["word"]), each["dof"]) == (each["verdict"] == CONTROLLABLE)
+                delta_controllable(parse(each["key"]), each["dof"]) == (each["verdict"] == CONTROLLABLE)
                 for each in every
                 if each["group"] == "deltas"
             ),
@@ -188,7 +188,7 @@ def rules(catalog: Catalog) -> str:
                 translation_rank(word) == each["rank"]
                 for each in every
                 if each["group"] in ("mixed", "spatial")
-                if translating(word := parse(each["word"]))
+                if translating(word := parse(each["key"]))
             ),
         ),
         (

@@ -66,7 +66,7 @@ def couplings(catalog: Catalog) -> str:
     """Verdicts of published robots that move in all ways, by how the first joints of their legs lie on the base."""
     counts: dict[int, Counter[str]] = {}
     for each in studied(catalog.where(group="3T3R")):
-        if match := ROBOT.match(each["word"]):
+        if match := ROBOT.match(each["key"]):
             counts.setdefault(int(match[4]), Counter())[each["verdict"]] += 1
     rows = [
         (BASES[number - 1], f"{sum(found.values()):,}", *(f"{found[v]:,}" for v in VERDICTS), share(found))

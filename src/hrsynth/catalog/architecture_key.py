@@ -253,15 +253,15 @@ def parse(text: str) -> ArchitectureKey:
     robot, at, seen = text.strip().partition("@")
     platform, colon, rest = robot.rpartition(":")
     if platform not in PLATFORMS or bool(colon) != bool(platform):
-        raise BadRequest(f"word {text!r}: unknown platform", platform, [name for name in PLATFORMS if name])
+        raise BadRequest(f"key {text!r}: unknown platform", platform, [name for name in PLATFORMS if name])
     bodies = [_legs(text, part) for part in rest.split("|")]
     if len(bodies) != PLATFORMS[platform]:
-        raise BadRequest(f"word {text!r}: bodies on which legs end", len(bodies), str(PLATFORMS[platform]))
+        raise BadRequest(f"key {text!r}: number of platform links", len(bodies), str(PLATFORMS[platform]))
     word = ArchitectureKey.of(*bodies, platform=platform, seen=sights(seen) if at else ())
     if at and any(leg.observed is not None for leg in word.legs):
-        raise BadRequest(f"word {text!r}: links of legs are not watched", "!", "no ! where something else is seen")
+        raise BadRequest(f"key {text!r}: sensors replace observed links", remedy="Omit ! or the part after @.")
     if not 2 <= len(word.legs) <= LARGEST_WORD:
-        raise BadRequest(f"word {text!r}: number of legs", len(word.legs), f"2 to {LARGEST_WORD}")
+        raise BadRequest(f"key {text!r}: number of legs", len(word.legs), f"2 to {LARGEST_WORD}")
     return word
 
 
@@ -273,9 +273,10 @@ def sights(text: str) -> tuple[SightWord, ...]:
         count = int(match["count"][:LONGEST_COUNT] or 1) if match else 0
         if match is None or match["kind"] not in known or not 1 <= count <= LARGEST_WORD:
             raise BadRequest(
-                f"what is seen, {text!r}: cannot be read",
+                f"sensors {text!r}: unknown term",
                 term,
-                f"kinds such as 3point, joined by +: {', '.join(known)}; up to {LARGEST_WORD}",
+                known,
+                remedy=f"Write 1 to {LARGEST_WORD} of a kind, such as 3point, and join kinds by +.",
             )
         found += [SightWord(match["kind"], bool(match["own"]))] * count
     return tuple(sorted(found))
@@ -286,10 +287,10 @@ def _legs(text: str, part: str) -> list[LegKey]:
     for term in part.split("+"):
         match = _LEGS.fullmatch(term.strip())
         if match is None:
-            raise BadRequest(f"word {text!r}: cannot be read", term, "legs such as 3(Rz*-Rz-Rz), joined by +")
+            raise BadRequest(f"key {text!r}: no legs", term, remedy="Write legs such as 3(Rz*-Rz-Rz), joined by +.")
         count = int(match["count"][:LONGEST_COUNT] or 1)
         if not 1 <= count <= LARGEST_WORD:
-            raise BadRequest(f"word {text!r}: number of equal legs", count, f"1 to {LARGEST_WORD}")
+            raise BadRequest(f"key {text!r}: number of equal legs", count, f"1 to {LARGEST_WORD}")
         try:
             leg = _known_leg(match["leg"])
         except BadRequest:
@@ -307,28 +308,28 @@ def _known_leg(chain: str) -> LegKey:
 def _leg(text: str, chain: str) -> LegKey:
     joints = tuple(_joint(text, part) for part in chain.split("-"))
     if joints[0].letter == "Pi" and joints[0].axes == "n":
-        raise BadRequest(f"word {text!r}: the Pi's normal is normal to the axis before it", chain, "a joint before it")
+        raise BadRequest(f"key {text!r}: axis n of the first joint", chain, remedy="Put a joint before Pin.")
     if sum(joint.watched for joint in joints) > 1:
-        raise BadRequest(f"word {text!r}: observed links of one leg", sum(joint.watched for joint in joints), "one")
+        raise BadRequest(f"key {text!r}: observed links of one leg", sum(joint.watched for joint in joints), "1")
     if joints[-1].watched and joints[-1].letter not in COMPOSITE:
-        raise BadRequest(f"word {text!r}: observed", "the platform", "a link of the leg")
+        raise BadRequest(f"key {text!r}: the platform is observed", chain, remedy="Put ! after another joint.")
     if len(joints) == 1 and joints[0].letter not in COMPOSITE:
-        raise BadRequest(f"word {text!r}: a leg of one joint has no segment to observe", chain, "two joints or more")
+        raise BadRequest(f"key {text!r}: a leg of one joint has no segment", chain, remedy="Use two joints or more.")
     return LegKey(joints)
 
 
 def _joint(text: str, part: str) -> JointSymbol:
     match = _JOINT.fullmatch(part)
     if match is None:
-        raise BadRequest(f"word {text!r}: unknown joint", part, f"a letter of {', '.join(AXES)}, axes, * and !")
+        raise BadRequest(f"key {text!r}: unknown joint", part, f"{', '.join(AXES)} with axes, * and !")
     letter, axes = match["letter"], match["axes"]
     if len(axes) != AXES[letter]:
-        raise BadRequest(f"word {text!r}: axes of {part!r}", len(axes), f"{AXES[letter]} for {letter}")
+        raise BadRequest(f"key {text!r}: axes of {part!r}", len(axes), f"{AXES[letter]} for {letter}")
     unknown = sorted(set(axes) - set(NAMES))
     if unknown:
-        raise BadRequest(f"word {text!r}: unknown axis in {part!r}", unknown[0], " ".join(NAMES))
+        raise BadRequest(f"key {text!r}: unknown axis in {part!r}", unknown[0], " ".join(NAMES))
     if letter != "U" and set(axes) & {"n", "q"} and (letter, axes) != ("Pi", "n"):
-        raise BadRequest(f"word {text!r}: axis n or q of {part!r}", letter, "a U, whose other axis it is normal to")
+        raise BadRequest(f"key {text!r}: axis n or q of {part!r}", letter, "U")
     if match["motor"] and letter not in MOVED:
-        raise BadRequest(f"word {text!r}: a motor on {part!r}", letter, MOVED)
+        raise BadRequest(f"key {text!r}: motor on {part!r}", letter, MOVED)
     return JointSymbol(letter, axes, bool(match["motor"]), bool(match["watched"]))

@@ -80,7 +80,7 @@ def without_motors(word: str) -> str:
 
 def make_records(entry: Callable[[str], dict[str, Any]], group: str, words: Iterable[str]) -> Made:
     """The records of words; a refused one says why, in one line. Raises ``Stopped`` for a defect of our own."""
-    return [(word, line({**_record(entry, word), "word": word, "group": group})) for word in words]
+    return [(word, line({**_record(entry, word), "key": word, "group": group})) for word in words]
 
 
 def _record(entry: Callable[[str], dict[str, Any]], word: str) -> dict[str, Any]:
@@ -90,7 +90,7 @@ def _record(entry: Callable[[str], dict[str, Any]], word: str) -> dict[str, Any]
         return {"refused": "; ".join(error.lines())}
     except Exception as error:
         what = " ".join(f"{type(error).__name__}: {error}".split())
-        raise Stopped(f"{word}: a defect of hrsynth itself, please report it: {what}") from error
+        raise Stopped(f"{word}: internal error: {what}. Report it with the command") from error
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ class Built:
     def to_dict(self) -> dict[str, Any]:
         return {
             "group": self.group,
-            "words": self.words,
+            "keys": self.words,
             "now": self.now,
             "before": self.before,
             "file": None if self.file is None else str(self.file),

@@ -57,7 +57,7 @@ def entry(text: str) -> dict[str, Any]:
     The same for the same word, whatever was asked before. Raises ``BadRequest`` for a text that is no word.
     """
     word = parse(text)
-    record: dict[str, Any] = {"word": str(word), "group": group(word), "see": count_equal(word.seen) or None}
+    record: dict[str, Any] = {"key": str(word), "group": group(word), "sensors": count_equal(word.seen) or None}
     found = _study_first(str(model(word)))
     if isinstance(found, str):
         return {**record, "refused": found}
@@ -151,13 +151,13 @@ def study(
         "dof": setup.dof,
         "motion": _motion(setup),
         "mobility": setup.mobility.total,
-        "idle": setup.mobility.internal,
+        "internal": setup.mobility.internal,
         "verdict": derivation.verdict.verdict,
         "rank": derivation.verdict.rank,
         "exact": derivation.exact.exact,
         "instances": derivation.exact.instances,
         "confirmed": len(setup.configurations),
-        "lost": [_general(freedom.name) for freedom in derivation.verdict.unobserved],
+        "unobserved": [_general(freedom.name) for freedom in derivation.verdict.unobserved],
         "minimal": [list(each) for each in fewest],
         "fewest": len(fewest[0]) if fewest else 0,
         "condition": None,
@@ -165,12 +165,12 @@ def study(
         "modes_bound": None,
         "modes_seen": None,
         "modes_proof": None,
-        "cure": None,
+        "suggestion": None,
     }
     if derivation.verdict.verdict == CONTROLLABLE:
         facts.update(_singular(setup), **_modes(setup, fewest))
     else:
-        facts["cure"] = _cure(advise(setup, most=1))
+        facts["suggestion"] = _cure(advise(setup, most=1))
     return ArchitectureStudy(facts, attempt, *_encoders(setup))
 
 
@@ -192,7 +192,7 @@ def smallest_sets(record: Mapping[str, Any], drawn: Mechanism) -> list[dict[str,
         if legs == record.get("modes_legs"):
             with suppress(HrsynthError):
                 near = len(modes(_observing(setup, legs)).near_modes)
-        found.append({"legs": list(legs), "hidden": hidden, "problem": problem, "near": near})
+        found.append({"legs": list(legs), "hidden": hidden, "problem": problem, "near_matches": near})
     return found
 
 

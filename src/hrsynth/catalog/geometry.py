@@ -267,7 +267,9 @@ class _Limb:
         names = joint.axes
         known = {name: unit(line) if name == "l" else self._vector(name, at) for name in names if name not in "nq"}
         if not known:
-            raise BadRequest(f"word {str(self.draft.word)!r}: axes of a U", names, "one that is named by itself")
+            raise BadRequest(
+                f"key {str(self.draft.word)!r}: axes of a U", names, remedy="Name one of them other than n or q."
+            )
         found = []
         for name, other in zip(names, reversed(names), strict=True):
             if name == "n":
@@ -278,9 +280,8 @@ class _Limb:
                 found.append(known[name])
         if abs(found[0] @ found[1]) > SQUARE_AXES:
             raise BadRequest(
-                f"word {str(self.draft.word)!r}: the axes of U{names} are not at right angles",
-                round(float(found[0] @ found[1]), 6),
-                "n or q for one of them",
+                f"key {str(self.draft.word)!r}: the axes of U{names} are not at right angles",
+                remedy="Use n or q for one of them.",
             )
         return found
 

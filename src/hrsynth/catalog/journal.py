@@ -27,7 +27,9 @@ class Journal:
         try:
             self._file = open_kept(path, os.O_RDWR | os.O_APPEND)
         except OSError as error:
-            raise BadRequest(f"cannot write the journal: {error.strerror}", str(path)) from None
+            raise BadRequest(
+                f"{path}: cannot write the journal: {error.strerror}", remedy="Choose another path."
+            ) from None
         try:
             require_alone(self._file, "another build is writing this journal", path)
             if anew:
@@ -81,11 +83,10 @@ class Journal:
                 if self._end == 0:
                     if text is None:
                         raise BadRequest(
-                            "a journal without checksums (of an older version) or with a damaged first line",
-                            str(self.path),
-                            "that file removed, or --anew",
+                            f"{self.path}: journal without checksums or with a damaged first line",
+                            remedy="Remove the file or use --anew.",
                         )
-                    read_head(text, str(self.path), "not the journal of a build", str(self.path))
+                    read_head(text, str(self.path), f"{self.path}: not the journal of a build", None)
                 elif text is not None:
                     with contextlib.suppress(BadRequest):
                         places[word_of(text)] = self._end, len(text)

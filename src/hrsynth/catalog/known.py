@@ -44,12 +44,12 @@ def equal_legs(word: str) -> bool:
 def is_called(record: Record, text: str) -> bool:
     """Whether a text occurs in a name under which a record's robot is known; words with other legs are not read."""
     found = kinds_called(text)
-    return bool(found) and kinds(record["word"]) in found and text.casefold() in known_as(record).casefold()
+    return bool(found) and kinds(record["key"]) in found and text.casefold() in known_as(record).casefold()
 
 
 def known_as(record: Record) -> str:
     """The names under which a record's robot is known; words with legs that no known robot has are not read."""
-    word = record["word"]
+    word = record["key"]
     return (alias(word) or "") if kinds(word) in kinds_called("") else ""
 
 
@@ -61,7 +61,7 @@ def bare(word: str) -> str:
 def order(record: Record) -> tuple[bool, bool, bool, bool, bool, bool]:
     """The place of a record in the list, smaller first: known by a name, with an answer, all legs equal, every default
     link watched, all motors on the base, controllable."""
-    word = record["word"]
+    word = record["key"]
     legs = len(set(parse(word).legs))
     return (
         alias(word) is None,

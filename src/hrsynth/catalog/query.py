@@ -50,9 +50,8 @@ class ReadRecords(Sequence[Record]):
             self._parts += 3 + sum(map(line.count, "[{,"))
             if self._parts > MOST_READ_PARTS:
                 raise BadRequest(
-                    f"{self._source or 'catalog'}: records with more than {MOST_READ_PARTS} parts",
-                    None,
-                    "fewer records, or smaller ones",
+                    f"{self._source or 'catalog'}: more than {MOST_READ_PARTS} JSON values",
+                    remedy="Restrict the search, for example by group.",
                 )
             found = self._read[place] = record(line, self._source)
         return found
@@ -78,7 +77,7 @@ class Catalog(Value):
         name = word if word in self._places else str(parse(word))
         if name not in self._places:
             close = difflib.get_close_matches(name, self._places, n=3, cutoff=0.4)
-            raise BadRequest("not in the catalog", name, f"{', '.join(close)} …" if close else None)
+            raise BadRequest(f"key {name}: not in the catalog", remedy=f"Use {' or '.join(close)}." if close else "")
         return self.records[self._places[name]]
 
     def where(self, **asked: Any) -> Catalog:
@@ -104,7 +103,7 @@ class Catalog(Value):
         return (
             self.records.words()
             if isinstance(self.records, ReadRecords)
-            else [str(each["word"]) for each in self.records]
+            else [str(each["key"]) for each in self.records]
         )
 
     def values(self, name: str) -> list[Any]:
@@ -138,9 +137,9 @@ def find_named(text: str, path: str | Path | None = None) -> list[Record]:
     """The records of robots that are called so, or whose legs are, those first that a list shows first: names that
     begin with the text before others. ``path`` as for :func:`load`."""
     called = (each for each in load(path, text=text) if is_called(each, text))
-    found = {each["word"]: each for each in (*called, *load(path, legs=text))}.values()
+    found = {each["key"]: each for each in (*called, *load(path, legs=text))}.values()
     starts = f", {text}".casefold()
-    return sorted(found, key=lambda each: (starts not in f", {alias(each['word'])}".casefold(), *order(each)))
+    return sorted(found, key=lambda each: (starts not in f", {alias(each['key'])}".casefold(), *order(each)))
 
 
 def count(path: str | Path | None = None, **asked: Any) -> int:
@@ -169,7 +168,7 @@ def _groups(kept: Store, asked: Mapping[str, Any]) -> list[str]:
     return [
         name
         for name in kept.groups()
-        if name in _tuple(wanted) or (wanted is None and (name == SENSORS) == (asked.get("see") is not None))
+        if name in _tuple(wanted) or (wanted is None and (name == SENSORS) == (asked.get("sensor") is not None))
     ]
 
 
@@ -181,7 +180,9 @@ def _there(path: str | Path | None) -> Store:
     """The store of a path, the shipped one where there is none; raises ``BadRequest`` where nothing is."""
     kept = shipped_folder() if path is None else store(path)
     if path is not None and not kept.path.exists() and not isinstance(kept, ShippedCatalogs):
-        raise BadRequest("no such catalog", str(path), f"a folder, or a file that ends in {', '.join(DATABASES)}")
+        raise BadRequest(
+            f"--catalog {path}: not found", remedy=f"Name a folder or a file that ends in {', '.join(DATABASES)}."
+        )
     if not kept.groups():
-        raise BadRequest("nothing in the catalog", str(kept.path), "one that was built by hrsynth catalog build")
+        raise BadRequest(f"{kept.path}: no catalog", remedy="Build one with hrsynth catalog build.")
     return kept

@@ -42,7 +42,7 @@ class Site:
             "architectures": self.architectures,
             "pages": self.pages,
             "now": self.now,
-            "differ": [{"word": word, "derived": found} for word, found in self.differ],
+            "differ": [{"key": word, "derived": found} for word, found in self.differ],
         }
 
 
@@ -63,7 +63,7 @@ def site(
         Where joblib is not installed.
     """
     if not len(catalog):
-        raise BadRequest("no architectures for a site", 0, "one or more")
+        raise BadRequest("no architecture fits", remedy="Widen the search.")
     team, tell = executor(workers), tell or (lambda *_: None)
     every = structures(catalog)
     differ: list[tuple[str, str]] = []

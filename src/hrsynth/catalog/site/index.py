@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from jinja2 import Environment
     from markupsafe import Markup
 
-TEXTS = ("group", "motion", "verdict", "notation", "hidden", "condition", "cure", "refused")
+TEXTS = ("group", "motion", "verdict", "notation", "hidden", "condition", "suggestion", "refused")
 """Fields with few values: each value once, and which of them a record has."""
-LISTS = ("steps", "lost")
+LISTS = ("steps", "unobserved")
 """The same of fields that are lists, joined."""
 NUMBERS = ("legs", "dof", "rank", "fewest")
 EXPLAINED = {
@@ -68,10 +68,10 @@ def columns(structures: Iterable[Structure]) -> dict[str, Any]:
     rows = [(place, record) for place, each in enumerate(structures) for record in each.records]
     found: dict[str, Any] = {"pages": [each.name for each in structures], "page": [place for place, _ in rows]}
     records = [record for _, record in rows]
-    found["word"] = [record["word"] for record in records]
-    found["name"] = [address_name(record["word"]) for record in records]
-    found["order"] = _ranks([(*order(record), record["word"]) for record in records])
-    found["alias"] = _places([alias(record["word"]) for record in records])
+    found["key"] = [record["key"] for record in records]
+    found["name"] = [address_name(record["key"]) for record in records]
+    found["order"] = _ranks([(*order(record), record["key"]) for record in records])
+    found["alias"] = _places([alias(record["key"]) for record in records])
     for field in NUMBERS:
         found[field] = [record.get(field) for record in records]
     found["base"] = [None if "base_motors" not in record else int(record["base_motors"]) for record in records]

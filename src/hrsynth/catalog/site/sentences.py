@@ -49,11 +49,13 @@ def answer(record: Record) -> Iterator[str]:
     """The plain answer, of an architecture that was not refused."""
     if "refused" in record:
         return
-    if "see" not in record:
+    if "sensors" not in record:
         labels = [str(k + 1) for k in range(record["legs"])]
-        yield shows(labels, "legs", record["rank"], record["dof"], " or ".join(record.get("lost", ())))
+        yield shows(labels, "legs", record["rank"], record["dof"], " or ".join(record.get("unobserved", ())))
     if record.get("minimal"):
-        yield fewest(record["minimal"], "observations" if "see" in record else "legs", record["rank"], record["dof"])
+        yield fewest(
+            record["minimal"], "observations" if "sensors" in record else "legs", record["rank"], record["dof"]
+        )
     if record.get("condition"):
         yield where_lost(record["condition"])
     proof = f"Exact in {record['instances']} instances"
@@ -65,7 +67,7 @@ def answer(record: Record) -> Iterator[str]:
 
 def cure(record: Record) -> str | None:
     """What to measure as well, so that nothing is lost."""
-    said = record.get("cure")
+    said = record.get("suggestion")
     if not said:
         return None
     if said.startswith("none of"):

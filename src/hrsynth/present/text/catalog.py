@@ -8,18 +8,18 @@ from typing import Any
 from ...errors import BadRequest
 from .tables import listing, table
 
-HEADS = ("word", "robot", "dof", "motion", "hidden robot", "verdict", "rank", "legs needed, or why refused")
-LEGEND = "* a motor   ══ the watched link"
+HEADS = ("key", "robot", "dof", "motion", "hidden robot", "verdict", "rank", "smallest leg sets, or reason of refusal")
+LEGEND = "* motor   ══ observed link"
 SHOWN = 100
 """Entries of a list that are printed."""
 PROOFS = {"class": "no more by the degrees of their equations", "rank": "no more by ranks modulo a prime"}
-"""By what there are no more modes, where that is no resultant."""
+"""Proofs of the bound on the number of modes other than a resultant."""
 
 Record = Mapping[str, Any]
 
 
 def entries(records: Sequence[Record], total: int, groups: Sequence[str] = ()) -> str:
-    """A line an entry, the first of many, and how many of all they are, in which groups; no others are looked at."""
+    """Return a row per entry, of the first ones if there are many, then their number and the groups searched."""
     tables = [name for name in groups if name[:1].isdigit()]
     count = f"{len(records)} of {total} architectures" + "".join(
         f" {what} {', '.join(names)}"
@@ -30,13 +30,13 @@ def entries(records: Sequence[Record], total: int, groups: Sequence[str] = ()) -
         if names
     )
     if len(records) > SHOWN:
-        count += f", the first {SHOWN} shown (all with --json; --legs, --motion, --verdict … ask for fewer)"
+        count += f", the first {SHOWN} shown (--json lists all; --legs, --motion, --verdict … restrict the list)"
     return f"{table([_row(record) for record in records[:SHOWN]], HEADS)}\n\n{count}" if records else count
 
 
 def entry(record: Record, drawn: str, note: str = "", smallest: Sequence[Record] = ()) -> str:
-    """One entry: its legs drawn, then what is known of it, with the hidden robots of its ``smallest`` sets."""
-    head = f"{record['word']}   {record.get('notation', '')}".rstrip()
+    """Return one entry: its legs drawn, then its data, with the hidden robots of its ``smallest`` sets."""
+    head = f"{record['key']}   {record.get('notation', '')}".rstrip()
     legs = [f"{drawn}\n{LEGEND}"] if drawn else []
     return "\n\n".join([head, *legs, listing(_all(record, smallest)), *filter(None, [note])])
 
@@ -45,43 +45,42 @@ LISTED: Mapping[str, type] = {
     **dict.fromkeys(("notation", "motion", "verdict"), str),
     **dict.fromkeys(("dof", "rank", "fewest"), int),
 }
-"""What every record that was not refused says in a list, and of which type."""
-TOLD: Mapping[str, type] = {**LISTED, "exact": bool, **dict.fromkeys(("mobility", "idle", "instances"), int)}
-"""The same of one that is shown in full."""
+"""Fields, with types, that every entry of a list has unless it was refused."""
+TOLD: Mapping[str, type] = {**LISTED, "exact": bool, **dict.fromkeys(("mobility", "internal", "instances"), int)}
+"""Fields, with types, of an entry that is shown in full."""
 
 
 def describe_built(groups: Iterable[Mapping[str, Any]]) -> str:
-    """A line a group that was built."""
+    """Return a row per group that was built."""
     rows = [
-        (*(str(each[name]) for name in ("group", "words", "now", "before")), each["file"] or "not complete")
+        (*(str(each[name]) for name in ("group", "keys", "now", "before")), each["file"] or "not complete")
         for each in groups
     ]
-    return table(rows, ("group", "words", "made now", "before", "file"))
+    return table(rows, ("group", "keys", "computed now", "before", "file"))
 
 
 def describe_site(done: Mapping[str, Any]) -> str:
-    """What a site holds, and where it starts."""
-    pages = f"{done['pages']:,} pages, {done['now']:,} made now"
+    """Return the number of pages of a site, and its start page."""
+    pages = f"{done['pages']:,} pages, {done['now']:,} written now"
     return f"{done['architectures']:,} architectures on {pages}: {done['index']}"
 
 
 def require_whole(record: Record, needed: Mapping[str, type]) -> None:
-    """Raise ``BadRequest`` for a record of a file that does not say all that is shown, as a build does."""
+    """Raise ``BadRequest`` for an entry of a file without fields that are shown."""
     wrong = [name for name, kind in needed.items() if not isinstance(record.get(name), kind)]
     if wrong and "refused" not in record:
         raise BadRequest(
-            f"the catalog's record of {record['word'][:60]!r} is not whole",
-            ", ".join(wrong),
-            "records as hrsynth catalog build writes them",
+            f"catalog entry {record['key'][:60]!r}: fields missing or of the wrong type: {', '.join(wrong)}",
+            remedy="Build the file again with hrsynth catalog build.",
         )
 
 
 def _row(record: Record) -> tuple[str, ...]:
     require_whole(record, LISTED)
     if "refused" in record:
-        return (record["word"], record.get("notation", ""), "", "", "", "refused", "", str(record["refused"]))
+        return (record["key"], record.get("notation", ""), "", "", "", "refused", "", str(record["refused"]))
     return (
-        record["word"],
+        record["key"],
         record["notation"],
         str(record["dof"]),
         record["motion"],
@@ -99,30 +98,31 @@ def _sets(record: Record) -> str:
 def _all(record: Record, smallest: Sequence[Record]) -> list[tuple[str, str]]:
     found = [("group", str(record.get("group", ""))), *facts(record, smallest)]
     found += [("motors", motors(record))] if "motors" in record else []
-    return [*found, ("choices", "  ".join(map(choice, record["choices"])))] if "choices" in record else found
+    return [*found, ("motor choices", "  ".join(map(choice, record["choices"])))] if "choices" in record else found
 
 
 def facts(record: Record, smallest: Sequence[Record] = ()) -> Iterable[tuple[str, str]]:
-    """What is known whatever is driven, by name; what is not known is left out. ``smallest``: the smallest sets with
-    their hidden robots."""
+    """Yield the data that do not depend on the motors, by name. ``smallest``: the smallest sets with their hidden
+    robots."""
     require_whole(record, TOLD)
     if "refused" in record:
         yield "refused", str(record["refused"])
         return
-    yield "dof", f"{record['dof']}, {record['motion']} (mobility {record['mobility']}, of which {record['idle']} idle)"
+    mobility = f"mobility {record['mobility']}, of which {record['internal']} internal"
+    yield "dof", f"{record['dof']}, {record['motion']} ({mobility})"
     yield "hidden robot", str(record.get("hidden", "none"))
     yield "verdict", f"{record['verdict']} (rank {record['rank']} of {record['dof']})"
     if record["exact"]:
         yield "exact", "proved" if record["instances"] == 1 else f"{record['instances']} instances"
     else:
-        yield "exact", "no: ranks of numbers; the geometry is more special than its relations say"
+        yield "exact", "no: numerical ranks; the geometry is less generic than its incidences"
     if "confirmed" in record:
         yield "confirmed", f"at {record['confirmed']} closed configurations"
     if record.get("steps"):
         yield "rules", "; ".join(record["steps"])
-    if record.get("lost"):
-        yield "lost", "; ".join(record["lost"])
-    told, what = ("held", "observations") if "see" in record else ("watched", "legs")
+    if record.get("unobserved"):
+        yield "unobserved", "; ".join(record["unobserved"])
+    told, what = ("fixed", "observations") if "sensors" in record else ("observed", "legs")
     if record.get("minimal"):
         yield f"{what} needed", _sets(record)
     if any(each["hidden"] != record.get("hidden") for each in smallest):
@@ -137,28 +137,28 @@ def facts(record: Record, smallest: Sequence[Record] = ()) -> Iterable[tuple[str
     if record.get("modes_bound") is not None:
         legs = f" with {what} {', '.join(record['modes_legs'])} {told}" if record.get("modes_legs") else ""
         proof = f", {PROOFS[record['modes_proof']]}" if record.get("modes_proof") in PROOFS else ""
-        near = next((each["near"] for each in smallest if each["legs"] == record.get("modes_legs")), None)
+        near = next((each["near_matches"] for each in smallest if each["legs"] == record.get("modes_legs")), None)
         yield (
             "modes",
             (
-                f"{record['modes_seen']} real seen of {record['modes_bound']} complex{legs}{proof}; "
+                f"{record['modes_seen']} real found of {record['modes_bound']} complex{legs}{proof}; "
                 f"near modes {'not counted' if near is None else f'found: {near}'}"
             ),
         )
     elif record["rank"] < record["dof"]:
-        yield "modes", f"a continuum of dimension {record['dof'] - record['rank']} with all {what} {told}"
-    if record.get("cure"):
-        yield "cure", str(record["cure"])
+        yield "modes", f"a continuous family of dimension {record['dof'] - record['rank']} with all {what} {told}"
+    if record.get("suggestion"):
+        yield "suggestion", str(record["suggestion"])
 
 
 def choice(each: Mapping[str, Any]) -> str:
-    """Which joints of each leg are driven, and of how many freedoms they determine."""
+    """Describe the actuated joints of each leg, and the number of dof that they determine."""
     driven = [",".join(map(str, joints)) or "none" for joints in each["joints"]]
     return f"joint {driven[0] if len(set(driven)) == 1 else ' | '.join(driven)} of each leg: {each['rank']}"
 
 
 def motors(record: Record) -> str:
-    """How many motors an architecture has, where, and what they determine."""
+    """Describe the motors of an architecture: number, place, and the number of dof that they determine."""
     base = "all on the base" if record["base_motors"] else "not all on the base"
-    rank = f"; they determine {record['motor_rank']} of {record['dof']} freedoms" if "motor_rank" in record else ""
+    rank = f"; they determine {record['motor_rank']} of {record['dof']} dof" if "motor_rank" in record else ""
     return f"{record['motors']}, {base}{rank}"

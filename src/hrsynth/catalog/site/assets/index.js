@@ -8,8 +8,8 @@ const HEADS = [
   ["notation", "robot"], ["hidden", "hidden robot"], ["dof", "freedoms"], ["verdict", "verdict"],
   ["fewest", "legs to watch"], ["base", "motors"], ["group", "group"],
 ];
-const TEXTS = ["alias", "group", "motion", "verdict", "notation", "hidden", "condition", "cure", "refused", "steps", "lost"];
-const count = CATALOG.word.length;
+const TEXTS = ["alias", "group", "motion", "verdict", "notation", "hidden", "condition", "suggestion", "refused", "steps", "unobserved"];
+const count = CATALOG.key.length;
 const form = document.getElementById("filters");
 const element = (id) => document.getElementById(id);
 const said = (number) => number.toLocaleString("en");
@@ -21,7 +21,7 @@ function value(field, i) {
 }
 
 /** All that a search looks at, in small letters: what is stored, and what is on the screen, where a motor is a line. */
-const haystack = CATALOG.word.map((word, i) => {
+const haystack = CATALOG.key.map((word, i) => {
   const shown = [value("notation", i), value("hidden", i)].map((own) => (own ?? "").replaceAll("*", ""));
   const cells = [`${value("fewest", i)} of ${value("legs", i)}`, BASE[value("base", i)] ?? "", value("verdict", i) ?? "refused"];
   return [word, ...TEXTS.map((field) => value(field, i) ?? ""), ...shown, ...cells].join("\n").toLowerCase();
@@ -115,7 +115,7 @@ function content(field, i) {
       link.href = `p/${CATALOG.pages[CATALOG.page[i]]}.html#${CATALOG.name[i]}`;
       link.append(own ? notation(own) : "not drawn");
       const word = document.createElement("code");
-      word.textContent = CATALOG.word[i];
+      word.textContent = CATALOG.key[i];
       const known = document.createElement("small");
       known.textContent = value("alias", i) ?? "";
       return [link, known, word];
