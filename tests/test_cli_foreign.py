@@ -30,7 +30,7 @@ def test_check_tells_what_was_guessed_and_json_stays_clean(call, tmp_path: Path)
     path = written(tmp_path, FILES["sdf: 1.7"])
     status, out, remarks = call("check", path, "--json")
     assert status == 0
-    assert json.loads(out)["configurations"][0]["mobility"] == {"total": 1, "idle": 0}
+    assert json.loads(out)["configurations"][0]["mobility"] == {"total": 1, "internal": 0}
     guess, motors = remarks
     assert motors == "hrsynth: no joint is driven: --motors a,c could be (the joints at the base)"
     assert guess.startswith("hrsynth: guess: the platform is link 'bar', the farthest from the base (--platform LINK")

@@ -108,7 +108,7 @@ class BadRequest(HrsynthError):
     expected
         Values that are possible.
     remedy
-        Sentence that says what to do: ``Use x, y or phi.``
+        Next step, a sentence: ``Use x, y or phi.``
     """
 
     def __init__(
@@ -153,7 +153,7 @@ class NoResult(HrsynthError):
     problem
         ``ROBOT: goal not met: number with unit``.
     remedy
-        Sentence that says what to do next.
+        Next step, a sentence.
     """
 
     exit_status = 3

@@ -149,12 +149,12 @@ def analysis(
                     ", ".join(source.bodies),
                     "a file with a <platform>, or derive, legs, check",
                 )
-            if any(given.get(name) is not None for name in ("seconds", "into")):
+            if given.get("into") is not None:
                 return function(*bound.args, **bound.kwargs)
             every = known.bind(*args, **given)
             every.apply_defaults()
             if "observe" in every.arguments:
-                every.arguments["observe"] = legs_asked(robot, every.arguments["observe"], every.arguments.get("see"))
+                every.arguments["observe"] = legs_asked(robot, every.arguments["observe"], every.arguments.get("sensor"))
             told = [(name, content(value)) for name, value in every.arguments.items() if name != "robot"]
             key = (function.__qualname__, robot, source.file, source.notes, source.options, source.sha256, *told)
             try:
