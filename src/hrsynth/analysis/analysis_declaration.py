@@ -154,7 +154,8 @@ def analysis(
             every = known.bind(*args, **given)
             every.apply_defaults()
             if "observe" in every.arguments:
-                every.arguments["observe"] = legs_asked(robot, every.arguments["observe"], every.arguments.get("sensor"))
+                sensor = every.arguments.get("sensor")
+                every.arguments["observe"] = legs_asked(robot, every.arguments["observe"], sensor)
             told = [(name, content(value)) for name, value in every.arguments.items() if name != "robot"]
             key = (function.__qualname__, robot, source.file, source.notes, source.options, source.sha256, *told)
             try:
