@@ -1,24 +1,24 @@
-"""Words of architectures: legs as chains of joints whose axes are named, robots as multisets of legs on a platform.
+"""Architecture keys: legs as chains of joints with named axes, robots as multisets of legs on a platform.
 
-A word says what stays so in motion and nothing else, no lengths::
+A key has the incidences that hold at all poses, and no lengths::
 
-    robot    = [platform ":"] legs ["|" legs] ["@" sights]
-    platform = "point" (all legs end on one R axis) or "bar" / "slide" (two plates, joined by a bar on two R and its
-               parallel twin, or by a P; "|" parts the legs of the one from those of the other)
+    robot    = [platform ":"] legs ["|" legs] ["@" sensors]
+    platform = "point" (all legs end on one R axis) or "bar" / "slide" (two plates, joined by two parallel
+               bars on R joints, or by a P; "|" separates the legs of the two plates)
     legs     = [count] "(" joint ("-" joint)* ")", several joined by "+"
     joint    = letter axes ["*"] ["!"]
     letter   = R P C (one axis), U (two, at right angles), S (none), Pi (the normal of a parallelogram), 2SS (two equal
                parallel rods between S joints, the axis along their distance), 2US (the same with U at the upper ends)
 
-    sights   = [count] kind ["'"], several joined by "+": what cameras on the base, or IMUs, see of the platform in the
-               place of the legs; ``'`` gives each a camera of its own, the others have one in common
+    sensors  = [count] kind ["'"], several joined by "+": observations of the platform by cameras on the base, or IMUs,
+               instead of the legs; ``'`` gives each its own camera, the others share one
 
 ``*`` marks a motor, ``!`` the joint after which the observed link follows (of two rods, the first of them), where it is
 not the default segment. Axes are directions at the zero configuration, named by
 
 =======  ==============================================================================================================
 x y z    the base's axes: the same direction for all legs; z is the normal of a planar robot
-t r      the tangent and the radius of the leg's foot on the base
+t r      the tangent and the radius at the leg's end on the base
 k        some direction of the leg's own normal to t
 h j m    directions of the leg's own normal to z
 a b c    directions of the leg's own, in general position
@@ -28,9 +28,9 @@ n q      in a U: normal to its other axis, and (n) to the line of centres next t
          the joint before it and to its rods
 =======  ==============================================================================================================
 
-The canonical word has its legs sorted, first as if they had no motors (a motor changes no leg's label), names letters
-of the same kind in the order of the leg, and drops the ``!`` of a default segment. It is the key of the catalog and is
-stable: a change of what a word means is a change of ``VERSION``.
+The canonical key has its legs sorted, first as if they had no motors (a motor changes no leg's label), names letters
+of the same kind in the order of the leg, and drops the ``!`` of a default segment. It is stable: a new
+meaning changes ``VERSION``.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ VERSION = 1
 AXES = {"R": 1, "P": 1, "C": 1, "U": 2, "S": 0, "Pi": 1, "2SS": 1, "2US": 1}
 """How many axes each letter has."""
 FREEDOMS = {"R": 1, "P": 1, "C": 2, "U": 2, "S": 3, "Pi": 1, "2SS": 4, "2US": 4}
-"""Freedoms of each letter (idle ones left out)."""
+"""Dof of each letter without internal motion."""
 COMPOSITE = ("Pi", "2SS", "2US")
 MOVED = ("R", "P", "C", "U")
 """Letters that can have a motor."""
@@ -61,7 +61,7 @@ NAMES = "xyztrkhjmabclonq"
 ALIKE = ("hjm", "abc")
 """Names that stand for the same kind of direction, in the order in which a leg uses them."""
 SENSORS = "sensors"
-"""The group of words whose platform is seen; all others watch legs."""
+"""Group of keys with sensors; all others observe legs."""
 PLATFORMS = {"": 1, "point": 1, "bar": 2, "slide": 2}
 """Platforms, and the bodies on which legs end."""
 
@@ -103,7 +103,7 @@ class LegKey:
 
     @property
     def freedoms(self) -> int:
-        """Freedoms of the leg's end."""
+        """Dof of the leg's end."""
         return sum(FREEDOMS[joint.letter] for joint in self.joints)
 
     @cached_property
@@ -178,7 +178,7 @@ class LegKey:
 
 @dataclass(frozen=True, order=True)
 class SightWord:
-    """An observation of the platform: its kind, and whether by a camera of its own."""
+    """Observation of the platform: its kind, and True for its own camera."""
 
     kind: str
     own: bool = False
@@ -189,8 +189,7 @@ class SightWord:
 
 @dataclass(frozen=True)
 class ArchitectureKey:
-    """An architecture: a platform and, for each of its bodies, the legs that end on it, sorted; and what is seen of the
-    platform instead of the legs, sorted too."""
+    """Architecture: a platform, the sorted legs that end on each of its links, and its sorted sensors."""
 
     platform: str
     bodies: tuple[tuple[LegKey, ...], ...]
@@ -249,7 +248,7 @@ def count_equal(symbols: Iterable[LegKey | SightWord]) -> str:
 
 
 def parse(text: str) -> ArchitectureKey:
-    """The word that ``text`` writes, canonical; raises ``BadRequest`` with what is wrong in it."""
+    """Parse a key into canonical form; raises ``BadRequest``."""
     robot, at, seen = text.strip().partition("@")
     platform, colon, rest = robot.rpartition(":")
     if platform not in PLATFORMS or bool(colon) != bool(platform):
@@ -266,7 +265,7 @@ def parse(text: str) -> ArchitectureKey:
 
 
 def sights(text: str) -> tuple[SightWord, ...]:
-    """What is seen of the platform, canonical; raises ``BadRequest``."""
+    """Parse sensors, in canonical order; raises ``BadRequest``."""
     known, found = [name for name, kind in kinds().items() if not issubclass(kind, Encoder)], list[SightWord]()
     for term in text.split("+"):
         match = _SIGHTS.fullmatch(term.strip())

@@ -1,4 +1,4 @@
-"""Who makes the records: this process, several on this machine, or a cluster. Parts come back in any order."""
+"""Executors of a build: this process, several on this machine, or a cluster. Parts return in any order."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def _wait_for_parts(client: Any, waiting: set[Any]) -> tuple[set[Any], set[Any]]
 
 
 def _result(future: Any) -> Made:
-    """What a part gave; what is neither our own ``Stopped`` nor a lost line is wrong with the cluster's workers."""
+    """Return the result of a part; other errors than ``Stopped`` and lost connections are those of the workers."""
     from concurrent.futures import CancelledError
 
     from distributed.scheduler import KilledWorker
@@ -147,5 +147,5 @@ def _require_alive(client: Any) -> None:
 
 
 def _with_version(task: Task, part: list[str]) -> tuple[str, Made]:
-    """What a part gives, and the version that made it."""
+    """Run a part; return its result with the version."""
     return __version__, task(part)

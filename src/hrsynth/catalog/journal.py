@@ -1,4 +1,4 @@
-"""The journal of a build: every record on the disk as soon as it is there, and a build goes on where it was killed."""
+"""Journal of a build: each entry is on the disk as soon as it is computed, so that a killed build continues."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class Journal:
         self.path.unlink(missing_ok=True)
 
     def _read(self, group: str) -> dict[str, tuple[int, int]]:
-        """Where the line of each word starts, and its length."""
+        """Return start and length of the line of each key."""
         places: dict[str, tuple[int, int]] = {}
         self._end = 0
         with os.fdopen(os.dup(self._file), "rb") as content:

@@ -1,4 +1,4 @@
-"""Records as lines: a head that says what they are, then a line of JSON each, as short as it can be and ASCII."""
+"""Entries as lines: a head with versions and group, then a line of compact ASCII JSON per entry."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..errors import BadRequest
 from .architecture_key import VERSION
 
 Record = Mapping[str, Any]
-"""What the catalog says of one architecture; a field that is missing is not known or does not apply."""
+"""Entry of one architecture; a missing field is unknown or does not apply."""
 
 CHECKSUM = "crc32"
 """What the head of a file that is not packed calls the checksum of all lines behind it."""
@@ -80,12 +80,12 @@ def line(entry: Record) -> str:
 
 
 def head(group: str, **more: object) -> str:
-    """The first line of a file, or of a journal, which says no more than this."""
+    """Return the first line of a file or journal."""
     return json.dumps({"format": FORMAT, "catalog": VERSION, "group": group, **more}, separators=(",", ":"))
 
 
 def read_head(text: str | bytes, file: str, otherwise: str, value: str | None, *needed: str) -> Mapping[str, Any]:
-    """What a file's first line says; raises ``BadRequest`` for another version, and in these words for no head."""
+    """Read a file's first line; raises ``BadRequest`` for another version or no head."""
     try:
         known = _loads(text)
         versions, *_ = (known["format"], known["catalog"]), *(known[name] for name in needed)
@@ -96,7 +96,7 @@ def read_head(text: str | bytes, file: str, otherwise: str, value: str | None, *
 
 
 def _loads(text: str | bytes) -> Any:
-    """What a line holds; raises ``ValueError`` also for one that is too long or nested too deeply."""
+    """Parse a line; raises ``ValueError`` also for one that is too long or nested too deeply."""
     if len(text) > LARGEST_RECORD:
         raise ValueError("too long")
     try:
@@ -121,7 +121,7 @@ def record(text: str, file: str | None = None) -> Record:
 
 
 def _wrong_field(found: dict[str, Any]) -> str:
-    """What a record lacks; nothing where it is whole."""
+    """Return the first defect of an entry, empty if there is none."""
     for name in ("key", "group", *(() if "refused" in found else NEEDED)):
         if name not in found:
             return f"a JSON object with a {name}"
@@ -145,7 +145,7 @@ def _wrong_field(found: dict[str, Any]) -> str:
 
 
 def _are(values: Any, kind: type) -> bool:
-    """Whether this is a list of values of a kind."""
+    """Return True for a list of values of a kind."""
     return type(values) is list and all(type(each) is kind for each in values)
 
 
@@ -166,7 +166,7 @@ def word_of(text: str, file: str | None = None) -> str:
 
 
 def is_written(text: str) -> bool:
-    """Whether a line is as :func:`line` writes it, and what it says stands in it letter by letter."""
+    """Return True if a line has the form of :func:`line`, without escapes."""
     return text.startswith(LINE_START) and _GROUP in text and '": ' not in text and "\\u" not in text
 
 
@@ -190,7 +190,7 @@ def _checksum(content: bytes) -> str:
 
 
 def head_count(first: bytes, file: str) -> int:
-    """The number of records that a file's first line says; raises ``BadRequest`` where it says none."""
+    """Return the number of entries in a file's first line; raises ``BadRequest`` without one."""
     return int(_read_count(first, file)["count"])
 
 

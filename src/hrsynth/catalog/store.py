@@ -1,4 +1,4 @@
-"""Where the catalog is kept: a folder with a file of lines for each group, or one SQLite file for all."""
+"""Stores of the catalog: a folder with a file of lines per group, or one SQLite file for all."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from .journal import ENDING, Journal
 from .jsonl import FLAGS, REBUILD, decode_lines, encode_lines, head_count, leading_word, record, require_version
 
 DATABASES = (".sqlite", ".sqlite3", ".db")
-"""Endings of a store that is one SQLite file."""
+"""Extensions of a SQLite store."""
 LINES, PACKED = ".jsonl", ".jsonl.gz"
-"""Endings of the files of a folder."""
+"""Extensions of the files of a folder."""
 TABLES = 3
 """Version of the tables of a SQLite file."""
 PACKED_ABOVE = 5_000
@@ -55,7 +55,7 @@ class Folder:
         return sorted({name.partition(LINES)[0] for name in names})
 
     def lines(self, groups: Sequence[str], asked: Mapping[str, Any]) -> list[str]:
-        """The lines of groups whose records fit what is asked for (:mod:`.conditions`), sorted by word in each."""
+        """Return the lines of groups that fit criteria (:mod:`.conditions`), sorted by key in each."""
         found, size = list[str](), 0
         for group in groups:
             content = self.content(group)
@@ -83,7 +83,7 @@ class Folder:
             return file, stream.read(most)
 
     def count(self, group: str) -> int:
-        """How many lines a group has."""
+        """Return the number of lines of a group."""
         file, content = self._bytes(group, LARGEST_RECORD)
         if file.name.endswith(PACKED):
             with contextlib.suppress(zlib.error):
@@ -137,8 +137,7 @@ class ShippedCatalogs(Folder):
 
 
 class Database:
-    """One SQLite file with the same lines, and tables that tell which of them fit (:mod:`.conditions`); it is asked as
-    a folder is."""
+    """SQLite file with the same lines, and tables for criteria (:mod:`.conditions`); same methods as a folder."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -185,7 +184,7 @@ class Database:
         return self.path
 
     def _column(self, asked: str, *values: object) -> list[Any]:
-        """What is found in one column; raises ``BadRequest`` for something else than a catalog, or another version."""
+        """Return the values of one column; raises ``BadRequest`` for another file or version."""
         with _refusing_sqlite_errors(self.path), contextlib.closing(self._open()) as file:
             return [value for (value,) in file.execute(asked, values)]
 
@@ -241,8 +240,8 @@ def _require_small(size: int, file: Path) -> None:
 
 
 def store(path: str | Path) -> Store:
-    """The store of this name: a SQLite file by its ending, else a folder; ``published`` or ``all`` of the package,
-    where there is no such folder."""
+    """Return the store of a name: a SQLite file by its extension, else a folder; ``published`` or ``all`` of the
+    package, unless there is such a folder."""
     path = Path(path)
     if path == Path(ALL) and not path.exists():
         return ShippedCatalogs(shipped_folder().path)
@@ -267,7 +266,7 @@ def _open_journal(file: Path, name: str, group: str, anew: bool) -> Journal:
 
 @contextlib.contextmanager
 def _refusing_sqlite_errors(file: Path) -> Iterator[None]:
-    """What SQLite complains of is a bad request."""
+    """Raise ``BadRequest`` for an error of SQLite."""
     try:
         yield
     except sqlite3.Error as error:

@@ -34,7 +34,7 @@ class Site:
     pages: int
     now: int
     differ: tuple[tuple[str, str], ...]
-    """Words whose derivation, made now, does not end in what the record says, and what it ends in."""
+    """Keys with a derivation that differs from the entry, and its result."""
 
     def to_dict(self) -> dict[str, Any]:
         return {
@@ -90,7 +90,7 @@ def _make_pages(team: Executor, folder: Path, wanted: Sequence[Structure]) -> It
 
 
 def _stamp(every: Iterable[Structure]) -> dict[str, str]:
-    """What a site is made from: the version, its templates, its records."""
+    """Return a digest of a site's sources: version, templates, entries."""
     digest = sha256()
     for kind in ("assets", "templates"):
         files = resources.files("hrsynth.catalog.site").joinpath(kind).iterdir()

@@ -14,7 +14,7 @@ from ...errors import BadRequest
 from ..store import writable
 
 STAMP = "site.json"
-"""Says that a folder is a site, and of what."""
+"""File that marks a folder as a site, with a digest of its sources."""
 FOLDERS = ("p", "r", "d")
 """Folders of the pages, of the robot files and of the small drawings."""
 OWN = frozenset({STAMP, *FOLDERS, "index.html", "data.js", "index.js", "page.js", "turn.js", "site.css", "report.css"})

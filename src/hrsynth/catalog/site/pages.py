@@ -71,7 +71,7 @@ def _write(folder: Path, structure: Structure, studied: Study) -> None:
 
 
 def _portrait(robot: Mechanism, studied: Study) -> Portrait:
-    """The robot in space, its watched links and the plane in which it moves marked where they are known."""
+    """Draw the robot in space, with its observed links and plane of motion if known."""
     if studied.derivation is None:
         return Portrait.draw(robot, [robot.platform], (), None)
     setup = studied.derivation.setup
@@ -121,7 +121,7 @@ def _driven_joints(robot: Mechanism) -> list[str]:
 
 
 def _variant(record: Record, robot: Mechanism | None) -> dict[str, Any]:
-    """What a page says of one architecture: its name, its motors, its file."""
+    """Return the data of one architecture for a page: name, motors, file."""
     return {
         "name": address_name(record["key"]),
         "key": record["key"],
@@ -134,8 +134,8 @@ def _variant(record: Record, robot: Mechanism | None) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """The number of the dimensions, the derivation in these (None: there is none), and what it ends in or why there is
-    none, where the record says otherwise."""
+    """Number of the dimensions, the derivation with these (or None), and its result or error if it differs from the
+    entry."""
 
     attempt: int
     derivation: Derivation | None = None
@@ -166,7 +166,7 @@ def study(record: Record) -> Study:
 
 
 def _difference(found: Derivation, record: Record) -> str:
-    """What a derivation ends in, where that is not what the record says."""
+    """Return the result of a derivation if it differs from the entry."""
     hidden = found.hidden_architecture and found.hidden_architecture.ascii
     same = (hidden, found.verdict.verdict, found.verdict.rank) == (
         record.get("hidden"),

@@ -49,7 +49,7 @@ class Structure:
 
     @classmethod
     def unpack(cls, text: str) -> Structure:
-        """What ``pack`` wrote."""
+        """Decode the text of ``pack``."""
         found: dict[str, Any] = json.loads(text)
         return cls(
             found["key"],

@@ -5,8 +5,8 @@ const FACETS = ["group", "legs", "dof", "motion", "verdict", "fewest", "base"];
 const BASE = { 1: "on the base", 0: "some move" };
 const HEADS = [
   ["order", "drawing"],
-  ["notation", "robot"], ["hidden", "hidden robot"], ["dof", "freedoms"], ["verdict", "verdict"],
-  ["fewest", "legs to watch"], ["base", "motors"], ["group", "group"],
+  ["notation", "robot"], ["hidden", "hidden robot"], ["dof", "dof"], ["verdict", "verdict"],
+  ["fewest", "legs needed"], ["base", "motors"], ["group", "group"],
 ];
 const TEXTS = ["alias", "group", "motion", "verdict", "notation", "hidden", "condition", "suggestion", "refused", "steps", "unobserved"];
 const count = CATALOG.key.length;
@@ -20,7 +20,7 @@ function value(field, i) {
   return Array.isArray(column) ? column[i] : column.values[column.at[i]] ?? null;
 }
 
-/** All that a search looks at, in small letters: what is stored, and what is on the screen, where a motor is a line. */
+/** Searched text in small letters: stored fields and shown cells, in which a line marks a motor. */
 const haystack = CATALOG.key.map((word, i) => {
   const shown = [value("notation", i), value("hidden", i)].map((own) => (own ?? "").replaceAll("*", ""));
   const cells = [`${value("fewest", i)} of ${value("legs", i)}`, BASE[value("base", i)] ?? "", value("verdict", i) ?? "refused"];
@@ -29,14 +29,14 @@ const haystack = CATALOG.key.map((word, i) => {
 
 let state = { q: "", sort: "", page: 1 };
 
-/** What the address asks for. */
+/** Read the filters of the address. */
 function read() {
   const asked = new URLSearchParams(location.hash.slice(1));
   state = { q: asked.get("q") ?? "", sort: asked.get("sort") ?? "", page: Math.max(1, Number(asked.get("page")) || 1) };
   for (const field of FACETS) state[field] = asked.get(field) ?? "";
 }
 
-/** Keep in the address what is asked for. */
+/** Write the filters to the address. */
 function write() {
   const asked = new URLSearchParams();
   for (const [name, given] of Object.entries(state)) {
@@ -100,7 +100,7 @@ function notation(text) {
   return whole;
 }
 
-/** What stands in a cell. */
+/** Content of a cell. */
 function content(field, i) {
   const own = value(field, i);
   switch (field) {
@@ -159,7 +159,7 @@ function choices(counts) {
   }
 }
 
-/** Which heading sorts, for those who see it and those who hear it. */
+/** Mark the sorting heading, for screen readers too. */
 function headings() {
   for (const head of document.querySelectorAll("#list th")) {
     const [field, down] = [state.sort.replace("-", ""), state.sort.startsWith("-")];
