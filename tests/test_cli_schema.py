@@ -104,7 +104,7 @@ def test_every_command_with_json_is_tried():
 
 def test_a_schema_refuses_what_is_wrong(here: Path, capsys):
     good = answered(capsys, "check rrrrr_m1")
-    for path in (["robot"], ["configurations", 0, "pose", "x"], ["configurations", 0, "classes", "RI"]):
+    for path in (["robot"], ["configurations", 0, "pose", "x"], ["configurations", 0, "singularity_indices", "RI"]):
         less, odd, more = (deepcopy(good) for _ in range(3))
         for record in (less, odd, more):
             inner = record

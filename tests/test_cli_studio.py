@@ -110,7 +110,7 @@ def test_a_port_that_is_taken_is_an_error_not_another_port(capfd: pytest.Capture
         assert ask(capfd, "--port", str(port)) == (
             2,
             "",
-            f"hrsynth: cannot serve the page: Address already in use, got {port}, expected a free port, or 0 for any\n",
+            f"hrsynth: cannot serve the page: Address already in use: got {port}, expected a free port, or 0 for any\n",
         )
         assert time.monotonic() - begin < 5
 

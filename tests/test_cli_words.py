@@ -242,7 +242,7 @@ def test_the_pose_of_a_question_is_named_where_another_name_is_given(
 ) -> None:
     capsys.readouterr()
     assert execute(command.split()) == 2
-    assert f"allowed: {usual} for the pose of this question" in capsys.readouterr().err
+    assert f"has no option --at. Use {usual} for the pose." in capsys.readouterr().err
 
 
 def test_ranges_have_units(printed):

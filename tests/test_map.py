@@ -86,7 +86,7 @@ def test_any_function_is_asked_and_any_question():
 
 
 @pytest.mark.parametrize(
-    ("question", "robots", "options", "allowed"),
+    ("question", "robots", "options", "expected"),
     [
         ("chek", "quattro", {}, "its name, such as check"),
         ("draw", "quattro", {}, "such as check"),

@@ -182,7 +182,7 @@ def test_one_leg_and_all_legs():
     ],
 )
 def test_what_are_no_legs_is_refused(given, word):
-    with pytest.raises(BadRequest, match=f"allowed: .*{word}"):
+    with pytest.raises(BadRequest, match=f"expected .*{word}"):
         hrsynth.observe("quattro", given)
 
 
@@ -308,10 +308,11 @@ class TestMemory:
             memory.answer(k, lambda k=k: object())
         assert list(memory.kept) == [2, 4, 3]
 
-    def test_what_depends_on_the_clock_is_not_kept(self):
-        options = {"start": "x=0.01,y=0,phi=0", "goal": "x=-0.01,y=0,phi=0", "runs": 0, "examine": 1, "size": 2}
-        one, two = (hrsynth.select("3rrr_m1", **options, seconds=9.0) for _ in range(2))
-        assert one is not two
+    def test_all_legs_with_a_sensor_are_another_result_than_the_sensor_alone(self):
+        for observe in ("all", None):
+            options = {} if observe is None else {"observe": observe}
+            seen = hrsynth.derive("3rpr_m1", sensor="encoder:slide_1", **options).setup.observed
+            assert (len(seen) > 1) is (observe is not None)
 
 
 class TestErrors:

@@ -83,8 +83,8 @@ def test_every_extra_that_is_named_is_there_and_all_holds_them():
 
 def test_a_missing_extra_is_told_with_both_commands_in_one_line():
     (line,) = MissingExtra("drawing", "plots").lines()
-    assert line.startswith(f'drawing needs an optional package: {sys.executable} -m pip install "hrsynth[plots]"')
-    assert 'in a checkout -m pip install ".[plots]"' in line
+    assert line.startswith(f'drawing needs an optional package. Run {sys.executable} -m pip install "hrsynth[plots]"')
+    assert f'in a checkout {sys.executable} -m pip install ".[plots]"' in line
 
 
 BLOCKED = """

@@ -1,14 +1,14 @@
-"""Hidden robots of parallel robots that are controlled by watching the directions of their legs.
+"""Hidden robots of parallel robots that are controlled by observing the directions of their legs.
 
     import hrsynth
 
-    found = hrsynth.derive("quattro", [1, 4])           # a name, a path, what load() gave; legs
+    found = hrsynth.derive("quattro", [1, 4])           # a name, a path or a loaded robot; legs
     found.verdict == "controllable"
     hrsynth.check("quattro", at=[0.02, 0.1, -0.7])      # a pose: text, dict, numbers, 4 x 4 matrix, pinocchio.SE3
     hrsynth.view("quattro", [1, 4])                     # in a notebook: the robot, which moves
     hrsynth.map_robots("check", ["quattro", "delta"], poses=[[0, 0, -0.7], [0.1, 0, -0.7]])    # in several processes
 
-An answer is one line at a prompt; ``print`` shows it in full, ``to_dict()`` is its JSON, ``hrsynth.draw`` its picture.
+A result is one line at a prompt; ``print`` shows it in full, ``to_dict()`` is its JSON, ``hrsynth.draw`` its figure.
 """
 
 from .index import homes
@@ -19,7 +19,7 @@ __all__ = sorted([*homes(), "__version__", "catalog"])
 
 
 def __getattr__(name: str) -> object:
-    """The public functions, imported when they are first asked for (``import hrsynth`` alone stays light)."""
+    """Import a public function at its first use, so that ``import hrsynth`` stays light."""
     from importlib import import_module
 
     if name == "catalog":
@@ -35,4 +35,4 @@ def __dir__() -> list[str]:
 
 
 Result.public = staticmethod(__getattr__)
-"""How results find what shows them, without an import of what stands above them."""
+"""Access of results to the functions that show them, which are in a higher layer."""

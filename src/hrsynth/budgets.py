@@ -1,6 +1,6 @@
-"""How much is tried before something is given up, and how large a thing may be: counts, lengths of steps and ways.
+"""Work limits and size limits: counts, step lengths, times.
 
-What decides whether two things are the same is in :mod:`tolerances`.
+Tolerances of comparisons are in :mod:`tolerances`.
 """
 
 # Mechanisms, poses, files
@@ -8,16 +8,15 @@ What decides whether two things are the same is in :mod:`tolerances`.
 LARGEST_MODEL = 256
 """Coordinates above which a mechanism is refused: Pinocchio's data hold several cubes of their number."""
 SURELY_MEANT = 2
-"""Configurations beside the first at which a relation must hold before that is no accident."""
+"""Samples besides the first at which an incidence must hold to count as structural."""
 LARGEST_GRID = 100_000
-"""Cells of a grid of poses beyond which it is taken for a slip."""
+"""Largest number of cells of a grid of poses; more is taken for a mistake."""
 FARTHEST_POSE = 1e9
-"""Metres or radians in a pose beyond which it is taken for a slip: numbers no longer tell nearby poses apart
-there."""
+"""Largest coordinate of a pose (metres, radians); beyond it numbers cannot separate nearby poses."""
 FARTHEST_JOINT = 100.0
-"""Metres or radians of a joint from which on it is taken for a slip: the way there is made in small steps."""
+"""Largest joint value (metres, radians) of a request; paths to it use small steps."""
 LARGEST_ROBOT = 20.0
-"""Characteristic length (m) above which it is asked whether a file has millimetres."""
+"""Characteristic length (m) above which lint suspects millimetres."""
 LARGEST_NUMBER = 1e9
 """Largest magnitude of a number that a robot file may hold (metres, radians)."""
 LARGEST_FILE = 20_000_000
@@ -31,7 +30,7 @@ MOST_UNKNOWN_NAMES = 300
 MOST_ATTRIBUTES = 200
 """Attributes of an element above which an XML document is refused: the most in any format are 50."""
 MOST_PREFIXES = 16
-"""Times that a document is parsed again with what stopped the parser left out."""
+"""Number of times a document is parsed again without the construct that stopped the parser."""
 MOST_LINKS = 1000
 """Links above which a foreign file is refused."""
 MOST_INCLUDES = 50
@@ -41,411 +40,398 @@ MOST_NESTED_MODELS = 20
 XACRO_SECONDS = 4
 """Seconds after which expanding a xacro file is given up."""
 LARGEST_UNPACKED = 200_000_000
-"""Bytes that a file may unpack to, all in it together: a catalog, an archive, what is read of a robot's meshes."""
+"""Largest unpacked size of a file, an archive or a robot's meshes (bytes)."""
 MOST_UNPACKED = 1000
 """Files that an archive may hold."""
 PROCESS_BYTES = 1_700_000_000
-"""Bytes of memory (addresses) of a process that reads a file which is not trusted."""
+"""Address space of a process that reads an untrusted file (bytes)."""
 USD_SECONDS, MESH_SECONDS = 10, 15
-"""Seconds of one core after which opening a USD stage, and reading the meshes of a robot, is given up; three times as
-many on the clock."""
+"""Time limit of one core for a USD stage, and for the meshes of a robot (s); three times as much by the clock."""
 VERIFY_SECONDS = 40
 """Seconds of one core after which checking a certificate file is given up."""
 MOST_MESHES = 2000
-"""Files of meshes that are copied with a robot."""
+"""Largest number of mesh files copied with a robot."""
 LARGEST_MESHES = 500_000_000
-"""Bytes that they may have together."""
+"""Largest total size of these mesh files (bytes)."""
 MOST_LOOP_COORDINATES = 240
 """Coordinates of joints in loops above which the loops of a foreign file are not solved."""
 SMALLEST_ROBOT = 1e-3
-"""Characteristic length (m) below which it is doubted that a file's lengths are metres."""
+"""Characteristic length (m) below which lint doubts that a file is in metres."""
 WIDEST_BODY = 20.0
 """Characteristic lengths that the body of an inertia may be wide."""
 LINTED_POSES = 3
-"""Configurations near the zero one at which a rank must be the same before lint says anything of it."""
+"""Configurations near zero at which a rank must agree before lint reports it."""
 SLIDES = 300
-"""Times that hinges' centres are slid along their axes to where two files agree."""
+"""Largest number of steps that align revolute joint centres of two files along their axes."""
 MOST_SENSES = 6
-"""Axes of a link up to which all senses that they may have in the other file are tried, where the likely ones miss."""
+"""Axes of a link up to which all signs in the other file are tried."""
 MOST_MENDING = 8
-"""Rounds in which what a mend uncovers is mended too."""
+"""Largest number of passes of lint --fix."""
 LOOP_STRIDE = 0.4
-"""Largest change of a coordinate in one step where they are (characteristic lengths, radians)."""
+"""Largest change of a coordinate per step of the loop solver (characteristic lengths, radians)."""
 LOOP_EFFORT = 100_000
-"""Joints visited there (and their like) after which solving is given up: some seconds."""
+"""Work limit of the loop solver in joint visits (some seconds)."""
 LOOP_TRIES = 24
-"""Random pushes and steps before the best pose found has to do."""
+"""Random restarts of the loop solver."""
 HELD_TRIES = 4
-"""Of these those in which motors, or joints at their limits, are held."""
+"""Restarts with motors, or joints at their limits, locked."""
 SINGULAR_STEPS = (0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0)
-"""Steps (radians, characteristic lengths) by which a singular zero pose is left, the first that does."""
+"""Steps (radians, characteristic lengths) that leave a singular zero configuration; the first that does is used."""
 NEARBY_AGREED = 4
-"""Configurations nearby that must agree before a zero pose is called special."""
+"""Nearby configurations that must agree before a zero configuration is called special."""
 FIRMER_BY = 2.0
-"""Factor by which another pose must be firmer to take the place of a nearly singular one."""
+"""Factor by which another configuration must be less singular to replace a nearly singular zero."""
 MOST_RELATED_ON_LINK = 40
-"""Joints of one link above which relations among them are not looked for."""
+"""Joints of one link above which their incidences are not searched."""
 LINKAGE_STARTS = 200
 """Random starts from which a linkage is closed."""
 MOST_CANDIDATES = 12
-"""Pairs of frames that are told as possible closures."""
+"""Largest number of frame pairs reported as possible closures."""
 MOST_DEFECTS = 100
-"""Defects of a file after which it is not read on."""
+"""Number of defects after which a file is not read further."""
 MOST_BESIDE, LARGEST_BESIDE = 50, 3_000_000
-"""Files of a kind beside a robot file, and their bytes together, above which none of them is looked at."""
+"""Number of sibling files of a kind, and their total size (bytes), above which none is read."""
 LARGEST_YAML = 1_000_000
 """Bytes of a YAML file above which it is not read."""
 LARGEST_GUESSED = 150
-"""Bodies of a foreign file above which ways to the base are not counted to guess the platform."""
+"""Links of a foreign file above which the platform is not assumed from path lengths."""
 FINER_TRIES = 5
-"""How often the tolerance for relations of rounded numbers is halved where they contradict each other."""
+"""Halvings of the snapping tolerance while relations contradict each other."""
 FEWEST_DECIMALS = 3
-"""Decimals from which a file's numbers can be rounded ones: with fewer they are typed."""
+"""Decimals from which a file's numbers can be rounded; with fewer they are typed."""
 FEWEST_ROUNDED = 5
-"""How many such numbers a file must have to show how it rounds."""
+"""Number of such numbers that shows the rounding of a file."""
 SURELY_ROUNDED = 4
-"""Decimals from which they are, whatever else shows it."""
+"""Decimals from which numbers are rounded in any case."""
 MOST_DECIMALS = 11
-"""Decimals up to which they can be."""
+"""Decimals up to which numbers can be rounded."""
 LARGEST_RELATED = 120
-"""Joints of a foreign file above which relations that are meant are not looked for."""
+"""Joints of a foreign file above which rounded incidences are not searched."""
 
 # Ways to a pose
 
 LONGEST_STEP = 0.3
-"""Largest change of a coordinate in one step on the way to a pose (characteristic lengths, radians)."""
+"""Largest change of a coordinate per step on the path to a pose (characteristic lengths, radians)."""
 LEG_ITERATIONS = 400
-"""Iterations in which a leg is closed at a pose, at most: each moves a joint by half a characteristic length or
-less."""
+"""Largest number of iterations that close a leg at a pose."""
 EASY_ITERATIONS = 10
-"""Iterations within which the robot itself must find each configuration of a sample's way again; more are a fold
-nearby."""
+"""Iterations within which a retraced sample must close; more indicate a fold."""
 FIRST_CELLS = 40
-"""Cells of a grid, nearest first, that are tried from the zero configuration before the grid counts as
-unreachable."""
+"""Nearest cells of a grid that are tried from zero before it counts as unreachable."""
 SWEEP_HALVINGS = 4
-"""How often a step is halved in a sweep, where a pose can be reached from several neighbours."""
+"""Halvings of a step in a sweep that can reach a pose from several neighbours."""
 WIDEST_CHART = 0.5
-"""Length of the coordinates of a tangent chart (characteristic lengths, radians) beyond which another should take
-over."""
+"""Length of tangent chart coordinates (characteristic lengths, radians) that starts a new chart."""
 SLIDER_PART = 0.98
-"""Part of the way to where a slider of the view stops that is used: the edge of the workspace is left out."""
+"""Fraction of the travel of a slider of the view that is used."""
 
 # Many poses at once
 
 CHAIN_STEP = 0.5
-"""Longest step of a link of a chain that is closed in a batch (characteristic lengths, radians)."""
+"""Longest step of a link of a chain closed in a batch (characteristic lengths, radians)."""
 CHAIN_STEPS = 4
-"""Steps of such a chain at each place on the way."""
+"""Steps of such a chain at each waypoint."""
 LARGEST_BATCH = 1 << 29
-"""Bytes that the result of one evaluation may take; more poses are asked for in parts (``Batch.sweep``)."""
+"""Largest result of one evaluation (bytes); larger ones are evaluated in parts (``Batch.sweep``)."""
 FAST_DIRECTIONS = 20.0
-"""How much larger than at home the rates of the directions may become on a walk of poses in a batch."""
+"""Largest ratio of direction rates to those at zero on a walk of poses in a batch."""
 POSES_FOR_NUMBA = 20_000
 """Poses of a batch from which compiled kernels are worth numba's start (half a second) in a run with many batches."""
 POSES_FOR_NUMBA_ONCE = 500_000
-"""The same in a run with this batch alone."""
+"""Poses of a single batch from which compiled kernels are faster."""
 POSES_FOR_COMPILING = 5_000_000
-"""Poses from which it pays that numba compiles a robot's kernels first."""
+"""Poses from which compiling a robot's kernels with numba is faster."""
 LARGEST_FIELD = 10_000_000
-"""Cells of a grid whose errors are kept in memory: 160 MB."""
+"""Largest number of grid cells with errors in memory: 160 MB."""
 LARGEST_SWEEP = 10_000_000_000
-"""Cells of a grid, beyond which it is taken for a slip, whose errors go to a file: 160 GB and some hours."""
+"""Largest number of grid cells with errors in a file: 160 GB and some hours."""
 SWEEP_PART = 1 << 16
-"""Poses of a part of such a grid, of which memory is had."""
+"""Poses of a sweep evaluated at a time."""
 SWEEP_DRAWN = 10_000
-"""Poses of it, at random, among which those are chosen at which it is held against Pinocchio."""
+"""Random poses of a sweep among which those are chosen that are compared with Pinocchio."""
 
 # Singularities, paths, modes
 
 WEAKEST_STARTS = 8
-"""Further starts, the weakest poses of parts of the walk, where the walk crosses no singularity."""
+"""Further starts, the poses of smallest singular value, of walks that cross no singularity."""
 RANK_DESCENTS, RANK_STEPS = 6, 40
-"""Weakest poses from which the rank itself is led to zero, and steps of each."""
+"""Poses from which the smallest singular value is minimised, and steps of each."""
 COARSE_GRID = 25
-"""Poses a side of the grid that finds how far a plane is reached."""
+"""Poses per side of the grid that finds the reach in a plane."""
 CLOSER = 4
-"""How many times closer the border of what it finds is looked at, where tips may be thin."""
+"""Refinement of the border of that grid."""
 LOCUS_SIDES = (2.5, 5.0)
-"""Half the side of that grid (characteristic lengths), and where the robot reaches its border, of a second one."""
+"""Half-sides of that grid (characteristic lengths); the second if the robot reaches the border of the first."""
 NEIGHBOUR_STEP = 0.01
-"""How far from a singular pose its neighbours are looked at (m)."""
+"""Distance of the neighbours of a singular pose (m)."""
 VALLEY_NARROWING = 0.5
-"""Part of its reach that the search in a valley keeps each time."""
+"""Fraction of its reach that the search in a valley keeps per step."""
 VALLEYS_ON_LINES = 600
-"""Valleys along lines that are looked into at most."""
+"""Largest number of valleys searched along lines."""
 VALLEYS_ON_PLANE = 12
-"""Valleys over the plane that are looked into at most."""
+"""Largest number of valleys searched in the plane."""
 FIRST_INTERVALS = 4
-"""Intervals that a way is first cut into where it is to be proved free of singularities."""
+"""Initial number of intervals of a path that is to be proved free of singularities."""
 FINEST_INTERVAL = 2.0**-16
-"""Length of an interval (of its way) below which such a proof is given up."""
+"""Smallest interval (fraction of its path) of such a proof."""
 ATLAS_INTERVALS = 60_000
-"""Intervals that are enclosed for all paths of an atlas together."""
+"""Largest number of intervals for all paths of the command aspects."""
 SECTION_STEPS = 90
-"""Turns of crank and platform at which the singular curve of a section is looked for, each."""
+"""Crank and platform angles at which the singular curve of a section is searched."""
 SECTION_STEP = 0.03
-"""Length of a step along it (characteristic lengths, components of unit vectors)."""
+"""Step along that curve (characteristic lengths, components of unit vectors)."""
 SECTION_ITERATIONS = 30
-"""Newton steps there."""
+"""Newton steps on that curve."""
 SECTION_PLACES = 4000
-"""Steps after which one of its pieces is followed no further."""
+"""Largest number of steps along one piece of it."""
 SECTION_APART = 0.1
-"""Distance from a known piece below which no new one is looked for, and between places whose images are one."""
+"""Distance from a known piece below which no new one is searched, and between points with one image."""
 REGION_WIDER = 1.5
-"""How much wider than the known poses the region is from which poses of a road map are drawn."""
+"""Enlargement of the region of the known poses from which a roadmap is sampled."""
 HOMOTOPY_ROUNDS = 3
-"""How often all paths of a homotopy are followed, each time on other ways, where some were lost."""
+"""Largest number of rounds of a homotopy, each on other paths."""
 HOMOTOPY_STEPS = 400
-"""Steps of a path after which it is given up."""
+"""Largest number of steps of a path."""
 SEARCH_STARTS = 300
-"""Random starts of the whole robot, at most, from which modes are looked for where no system of equations is known for
-them."""
+"""Largest number of random starts in a search of modes without equations."""
 SEARCH_QUIET = 100
-"""Starts in a row that close without a new mode after which the search ends."""
+"""Closed starts without a new mode that end this search."""
 SEARCH_ITERATIONS = 100
-"""Iterations in which each of them is closed, at most."""
+"""Iterations that close each start."""
 NEAR_MODE_STEPS = 60
-"""Steps in which a near mode is found from a candidate, at most."""
+"""Steps from a candidate to a near mode."""
 SEARCH_MOTIONS = 12
-"""Self-motions that one search follows at most."""
+"""Largest number of self-motions followed by one search."""
 MOTION_STEPS = 100
-"""Steps over which a self-motion is followed either way, at most."""
+"""Steps of a self-motion in each direction."""
 MOTION_HALVINGS = 6
-"""How often such a step is tried, each time half as long."""
+"""Halvings of such a step."""
 BRANCH_CHOICES = 256
-"""Choices of branches of held legs that are solved; where there are more the list of modes is not complete."""
+"""Largest number of combinations of leg solutions; beyond it the list of modes is not complete."""
 EFFORT = 120.0
-"""Seconds of one core that a list of modes may need, by its size (the answer does not depend on the machine)."""
+"""Default time limit of a list of modes (s of one core), compared with an estimate that no machine changes."""
 ELIMINATION_SECONDS, HOMOTOPY_SECONDS, MSOLVE_SECONDS = 0.02, 0.4, 2.0
-"""What one system of equations needs, about: by an exact resultant, by forty paths, by an external program."""
+"""Estimated time of one system (s): exact resultant, forty paths, external program."""
 LARGEST_FORMS, FORMS_SECONDS, FEW_FORMS_SECONDS = 1100, 46.0, 0.1
-"""Forms of a degree above which all poses of conditions are not looked for by linear algebra, and the seconds of one
-core that so many need, and few."""
+"""Largest number of forms of a degree in linear algebra, and estimated time (s) for that many, and for few."""
 CAP_OF_MULTIPLES, LARGEST_MULTIPLES = 4, 250
-"""Largest degree in a group of unknowns, and most monomials, of a bound by multiples of quadrics."""
+"""Largest degree in a group of unknowns, and number of monomials, of a bound by multiples of quadrics."""
 LARGEST_GEAR, LARGEST_LOOPS, PLANAR_STARTS, LOOP_SYSTEMS = 6, 120, 20, 3
-"""Of planar loops: whole numbers of which a gear's ratio is the quotient, closings that are looked for, how many times
-64 random starts, and choices of what is measured besides, where more is measured than needed."""
+"""Planar loops: largest numerator of a ratio, solutions searched, multiples of 64 random starts, choices of square
+systems."""
 LARGEST_JOINT_FORMS = 750
-"""The same of conditions on a leg's joints."""
+"""Largest number of forms of conditions on a leg's joints."""
 MOST_INFINITE = 4
-"""Powers of q · q that are tried to leave out what are no poses."""
+"""Powers of q · q tried to exclude extraneous solutions."""
 FINEST_BOX = 2.0**-100
-"""Radius of the smallest box that is tried around a solution, relative to 1 plus the unknown."""
+"""Radius of the smallest box around a solution, relative to 1 plus the unknown."""
 LARGEST_RANDOM = 10**9
-"""Range of the random whole numbers of exact instances, of either sign: the larger, the smaller the chance of an
-accident."""
+"""Range of random integers of rational instances, of either sign."""
 
 BRANCH_CELLS = 1000
-"""Cells of motor coordinates that are tried at most where a branch is proved, for each part of the loops."""
+"""Largest number of cells of motor coordinates in the proof of a branch, per part of the loops."""
 FINEST_BRANCH_CELL = 40
-"""Halvings of a side of the box that the whole numbers that count them can tell."""
+"""Largest number of halvings of a side, limited by the integer cell index."""
 WIDEST_BRANCH_BOX = 1000.0
-"""The widest interval of a motor (radians, characteristic lengths) in which its branch is followed."""
+"""Widest interval of a motor (radians, characteristic lengths) of a branch."""
 BRANCH_DEPTH = 7
-"""How often a cell of a branch is halved at most for each motor, and once more as often."""
+"""Largest number of halvings of a cell per motor."""
 COARSEST_BRANCH_CELL = 4.0
-"""How much larger a cell may be than the largest about zero that is proved at once, to be tried."""
+"""Largest cell tried, as a multiple of the largest one proved around zero."""
 TUBE_RADII = 4
-"""Radii of a tube that are tried, each after the one before was too narrow."""
+"""Number of radii tried for a tube."""
 TUBE_WIDER = 1.2
-"""How much wider than what a linear estimate asks for a tube is tried."""
+"""Enlargement of a tube over its linear estimate."""
 BACK_CELLS = 256
-"""Cells of all motors together over which the way back, from the platform to the motors, is looked at."""
+"""Cells of all motors in the proof that the inverse map is unique."""
 BACK_TRIALS = 5000
-"""Sets of cells and pairs of them that are tried, at most, to prove that no two motors in a box have one pose."""
+"""Sets and pairs of cells tried in that proof."""
 BACK_SIZES = 12
-"""Boxes that are tried for the way back, each 0.7 of the one before."""
+"""Boxes tried for the inverse map, each 0.7 of the one before."""
 BACK_SIDES = 6
-"""How often a side of such a box is moved out."""
+"""Enlargements of a side of such a box."""
 FARTHEST_MOTOR = 1e6
-"""Coordinate (m, rad) up to which a motor outside of all loops is taken where it has no limits."""
+"""Largest coordinate (m, rad) of a motor outside of all loops without limits."""
 
 # Accuracy
 
 BEST_FIT_FIRST_STEP = 0.25
-"""Part of the error of the directions that the first step along a best-fit curve makes."""
+"""First step along a best-fit curve, as a fraction of the direction error."""
 BEST_FIT_SHORTEST_STEP = 2.0**-22
-"""Part of the error below which a step along a best-fit curve is not shortened any more."""
+"""Smallest step along a best-fit curve, as a fraction of the error."""
 BEST_FIT_STEPS = 200
-"""Steps that are tried on one best-fit curve."""
+"""Largest number of steps on one best-fit curve."""
 
 # The loop and its camera
 
 RUN_AWAY = 20.0
-"""Characteristic lengths from its start at which a platform has run away."""
+"""Distance (characteristic lengths) from its start at which a platform has diverged."""
 RUN_EVALUATIONS = 20_000
-"""Configurations that the integrator may ask for in a servo run."""
+"""Largest number of configurations evaluated by the integrator in a servo run."""
 FLOW_STARTS, FLOW_STARTS_ONE_BY_ONE = 100_000, 2_500
-"""Starts of runs, where many are followed at once and where each is simulated."""
+"""Largest number of starts, batched, and simulated one by one."""
 FLOW_PART, FLOW_FEW, FLOW_SINGLE = 5_000, 2_000, 1
-"""Starts abreast, at most, the last ones of all pieces, that go on together, and single runs, that are one piece of
-work for a process."""
+"""Starts per batch, last starts that continue together, and single runs per task of a process."""
 FLOW_FOLLOWED, FLOW_CHECKED, FLOW_NAMED = 24, 6, 16
-"""Of many runs at once, those that could not go on and are simulated one by one, others that are held against that, and
-the poses of rest that are named."""
+"""Runs of a batch that are simulated one by one because they stopped, as a check, and named equilibria."""
 FLOW_EXAMPLES = 8
-"""Of starts that end alike, those of which one to which small steps lead is told."""
+"""Starts with one end among which an example is chosen that is reached by small steps."""
 FLOW_STEPS, FLOW_KEPT = 4_000, 4
-"""Steps of many runs at once, and steps for which the slopes of the law are kept."""
+"""Largest number of steps of batched runs, and steps that reuse the slopes of the law."""
 LONGEST_RUN = 10_000.0
-"""Seconds that a run with noise, on the physics bench or along a way may take: these go on to their end."""
+"""Longest run (s) with noise, in dynamic simulation or along a path; these continue to their end."""
 ENDING_STARTS = 200
-"""Starts of one round in which critical points of a loop's error are sought."""
+"""Starts of one round of the search of critical points."""
 ENDING_ROUNDS = 12
-"""Rounds at most, of robots with many coordinates."""
+"""Largest number of rounds for robots with many coordinates."""
 ENDING_EFFORT = 300
-"""Coordinates of all rounds together, up to which there may be more rounds of robots with few."""
+"""Sum of coordinates over all rounds up to which robots with few coordinates have more rounds."""
 ENDING_DESCENTS, ENDING_LEAST = 3, 7
-"""Rounds before the last one at least where only what attracts is sought, and where all rests are."""
+"""Least number of rounds when only stable equilibria are searched, and when all are."""
 ENDING_LATE = 0.005
-"""Part of the critical points that the later half of the starts may find first for the search to end."""
+"""Fraction of the critical points first found by the later half of the starts at which the search ends."""
 ENDING_LATE_DESCENT = 0.02
-"""The same where only what attracts is sought."""
+"""The same fraction when only stable equilibria are searched."""
 SELECT_ROUNDS = 4
 """Rounds for each set of legs of which the best is selected."""
 ENDING_WALK = 6
-"""Random steps along the loops from the starts of one round to those of the next."""
+"""Random steps along the loops between the starts of two rounds."""
 ENDING_STEPS = 80
 """Steps of one start."""
 FARTHEST_ENDING = 50.0
-"""Coordinate (characteristic lengths, radians) beyond which a start is given up."""
+"""Coordinate (characteristic lengths, radians) beyond which a start stops."""
 POSE_WALKS = 0.17
-"""Part of the rounds of starts over the joints that is left where critical poses are sought as well."""
+"""Fraction of joint-space rounds that remains if critical poses are searched as well."""
 POSE_STARTS, POSE_ROUNDS = 800, 60
-"""Starts of one round in which critical poses are sought where legs have closed forms, and rounds at most, for each
-choice of legs that are held."""
+"""Starts of one round of the search of critical poses with closed-form legs, and rounds per choice of locked legs."""
 POSE_BESIDE = 0.6
-"""Part of them that lies beside poses that were found before."""
+"""Fraction of these starts near poses found before."""
 POSE_NEWTON = 0.5
-"""Part of these that go by Newton's method all along."""
+"""Fraction of the latter that uses Newton's method throughout."""
 POSE_THINNED = 16
-"""So many times as many poses are drawn at most: not all of them are in reach."""
+"""Largest ratio of poses drawn to poses in reach."""
 POSE_LATE, POSE_QUIET = 0.001, 8
-"""Part of the critical poses that the last rounds, so many, may find first for the search to end."""
+"""Fraction of the critical poses first found in the last rounds, and their number, at which the search ends."""
 POSE_TRIES = 12
-"""Configurations, the nearest first, from which one at a critical pose is sought."""
+"""Nearest configurations from which one at a critical pose is searched."""
 POSE_MIRRORS = 3
-"""Rods that slide through a base point, as many at most for which both directions are listed at each pose."""
+"""Largest number of rods sliding through a base point with both directions listed at each pose."""
 AXIS_SEEN = 0.5
-"""Part of a leg's axis that is to be seen by a camera: its direction is rebuilt from what is seen of its edges."""
+"""Fraction of a leg's axis that must be visible."""
 WIDEST_NOISE = 50.0
-"""Pixels by which an edge may be wrong at most."""
+"""Largest error of an edge (pixels)."""
 PICTURE_OVERSAMPLING = 3
-"""Drawn pixels a pixel each way where edges are sought: not every driver smooths edges by itself."""
+"""Rendered pixels per pixel and direction for edge detection."""
 
 # The catalog
 
 PARTS_AHEAD = 3
-"""Parts of a build that wait for each thread of a cluster."""
+"""Parts of a build waiting for each thread of a cluster."""
 MOST_RECORDS = 1_000_000
-"""Lines of a compressed file of the catalog."""
+"""Largest number of lines of a compressed catalog file."""
 LARGEST_RECORD = 100_000
-"""Characters of a line of the catalog, and of a text in a SQLite file."""
+"""Largest line of the catalog, and text in a SQLite file (characters)."""
 LARGEST_CATALOG = 100_000_000
-"""Bytes of the lines of a catalog that are read, unpacked, those of its groups together."""
+"""Largest unpacked size of the lines of a catalog (bytes)."""
 MOST_READ_PARTS = 7_000_000
-"""Lists, objects and commas in all records that are read, and three more for each: a part takes up to two hundred bytes
-of memory where all are shown as JSON."""
+"""Lists, objects and commas in all entries read, plus three per entry: each takes up to two hundred bytes."""
 LARGEST_WORD = 12
-"""Legs of a word of the catalog."""
+"""Largest number of legs of an architecture key."""
 
 # What is remembered
 
 REMEMBERED = 32
-"""Observed robots that are kept for further questions about them."""
+"""Observed robots kept in the cache."""
 LEGS_HELD = 64
-"""Legs with their measurements held that are kept for other sets of legs of the same robot."""
+"""Locked legs kept in the cache for other sets of legs of one robot."""
 REMEMBERED_ANSWERS = 64
-"""Answers that are kept where the same is asked again."""
+"""Results kept in the cache."""
 REMEMBERED_GRIDS = 2
-"""Answers over grids and planes of poses that are kept: they may be large."""
+"""Results on grids and planes kept in the cache."""
 
 # The page to work in
 
 MOST_TABS = 8
-"""Tabs of the page that are served at once: each has two processes."""
+"""Largest number of tabs served at once, with two processes each."""
 MOST_CONNECTIONS = 100
-"""Connections to its server at once."""
+"""Largest number of connections to the server."""
 MOST_WAITING = 64
-"""Asks of a tab that wait for one of its processes."""
+"""Largest number of waiting requests of a tab."""
 LARGEST_ASK = 256 * 1024
-"""Bytes of a message of the page."""
+"""Largest message of the page (bytes)."""
 LARGEST_ANSWER = 64 * 1024 * 1024
-"""Bytes of an answer to it."""
+"""Largest reply to it (bytes)."""
 LARGEST_UPLOAD = 20_000_000
-"""Bytes of a file that is dropped into the page."""
+"""Largest file dropped into the page (bytes)."""
 MOST_UPLOADS = 50
-"""Files that a tab holds."""
+"""Largest number of files of a tab."""
 LONGEST_FILE_NAME = 200
-"""Bytes of the name of such a file."""
+"""Longest name of such a file (bytes)."""
 MOVE_SECONDS = 10.0
-"""Seconds after which a move of the robot is given up, and its process ended."""
+"""Time limit of a move of the robot (s); its process then ends."""
 ASK_SECONDS = 120.0
-"""The same for any other ask."""
+"""Time limit of any other request (s)."""
 WORKER_START_SECONDS = 60.0
-"""Seconds after which a process that does not start is given up."""
+"""Time limit for the start of a process (s)."""
 WORKER_BYTES = 4 * 1024**3
-"""Bytes of memory (addresses) that such a process may have."""
+"""Address space of such a process (bytes)."""
 SENDER_SECONDS = 10.0
-"""Seconds in which a request's head must be here, and each further part of its body."""
+"""Time limit for a request's head and each part of its body (s)."""
 UPLOAD_SECONDS = 60.0
-"""Seconds in which a whole file must be here."""
+"""Time limit for a whole file (s)."""
 FAREWELL_SECONDS = 2.0
-"""Seconds that open connections are given when the server ends."""
+"""Time that open connections have when the server ends (s)."""
 LONGEST_STUDIO_NAME = 500
-"""Characters of a name in a question of the studio."""
+"""Longest name in a request of the studio (characters)."""
 LARGEST_STUDIO_LIST = 200
-"""Names in a list of such a question."""
+"""Longest list of names in a request."""
 LARGEST_STUDIO_PLANE = 101
-"""Poses a side of a plane of the studio."""
+"""Poses per side of a plane of the studio."""
 LARGEST_STUDIO_SWEEP = 16
-"""The same where they are found one by one."""
+"""Poses per side of a plane that is solved pose by pose."""
 FOLLOWING = 60
-"""Iterations in which a hidden robot is to follow the real one in the view."""
+"""Iterations in which a hidden robot follows the real one in the view."""
 APPROACH = 8
-"""Steps, once the straight way ends, by which a dragged platform comes nearer to where it is wanted."""
+"""Steps by which a dragged platform approaches its target after the straight path ends."""
 
 # Generated programs
 
 NEWTON_STEPS_AT_RUN = 8
-"""Steps of Newton's method that a generated program takes at most in each part of the loops."""
+"""Largest number of Newton steps of generated code per part of the loops."""
 CELLS_TOGETHER = 32
-"""Cells of a branch in which the steps of a program are bounded together."""
+"""Cells of a branch whose steps are bounded together."""
 BOUND_HALVINGS = 3
-"""How often the sides of a cell are halved, at most, to bound them."""
+"""Largest number of halvings of a cell for bounds."""
 MOST_PARTS = 64
-"""Into how many parts it is cut at once, at most."""
+"""Largest number of parts of one subdivision."""
 MOST_BOUNDED = 2_000
-"""Parts of a size that are bounded, about."""
+"""Approximate number of parts of one size that are bounded."""
 MOST_BOUNDED_NUMBERS = 20_000
-"""Slopes of such parts in a program, about."""
+"""Approximate number of slopes of such parts in generated code."""
 INVERSE_STEPS_AT_RUN = 20
-"""Steps from motors to motors that it takes at most towards a pose."""
+"""Largest number of steps of generated code from motors to motors toward a pose."""
 CONE_BOXES = 60_000
-"""Slices of cones about a goal that are tried at most, where the error is proved to rise along every ray."""
+"""Largest number of slices of cones in the proof that the error rises along every ray from a goal."""
 CONES_AT_ONCE = 2048
 """Cones whose next slice is tried together: those of the lowest levels."""
 RAYS = 3000
-"""Rays from a goal along which it is seen, not proved, how high the error rises."""
+"""Rays from a goal along which the rise of the error is found, not proved."""
 RADIUS_BOXES = 60_000
-"""Boxes with which a certified radius is tried, at most."""
+"""Largest number of boxes in the proof of an attraction radius."""
 INWARD_BOXES, RADIUS_AT_ONCE = 30_000, 2048
-"""Boxes with which a ball is tried into which the law leads, at most, and those that are looked at together."""
+"""Largest number of boxes in the proof of a ball into which the flow points, and of boxes processed together."""
 COVER_BOXES = 8_000_000
-"""Boxes of platform poses that are looked at, at most, where all critical points of the error are to be listed."""
+"""Largest number of boxes of platform poses in the proof of all critical points."""
 SIGN_BOXES = 80_000
-"""Boxes of platform poses of three freedoms, at most, in which those are sought at which the error vanishes; with more
-freedoms only where all critical ones are asked for."""
+"""Largest number of boxes of poses of three dof in the proof of all zeros of the error; with more dof only on
+request."""
 SIGN_CHOICES = 64
-"""Choices of reversed legs, at most, that are told one by one."""
+"""Largest number of choices of reversed legs reported one by one."""
 BOX_STEPS_IN_NUMPY, BOXES_A_CALL = 40_000_000, 600
-"""Operations on boxes that are done in NumPy, a second or two, before numba's start pays; and how many boxes take as
-long as a call."""
+"""Operations on boxes done in NumPy before numba is started, and boxes that take as long as one call."""
 BOXES_AT_ONCE = 4096
-"""Boxes of those that are looked at together."""
+"""Boxes processed together."""
 BOXES_ALONE = 400_000
-"""Boxes of them that are looked at before the work is shared among processes."""
+"""Boxes processed before the work is shared among processes."""
 BOX_PARTS, BOXES_A_PART = 16, 200_000
-"""Into how many parts it is then split, and how many boxes of each are looked at before it is split again."""
+"""Parts of shared work, and boxes of each before it is split again."""

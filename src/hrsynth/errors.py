@@ -1,4 +1,7 @@
-"""Everything that can go wrong because of what a user gave: one class a situation, the facts as data."""
+"""Errors of the package, one class per situation, with the facts as data.
+
+Messages: a defect of a file, a request that cannot be served, a sound request without a result; each with a remedy.
+"""
 
 from __future__ import annotations
 
@@ -15,25 +18,25 @@ class HrsynthError(Exception):
 
     exit_status = 2
     file: str | None = None
-    """The robot file that the error is about, where its text does not say so itself."""
+    """Robot file that caused the error, unless the message names it."""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickled by what it says, whatever it was made of: workers tell their errors so."""
+        """Pickle the message instead of the constructor arguments, so that workers can return errors."""
         return _error, (type(self), self.args), self.__dict__
 
     def lines(self) -> list[str]:
-        """One line per defect, without the program's name."""
+        """Return one line per defect, without the program's name."""
         text = " ".join(str(self).split())
         return [text if self.file is None else f"{self.file}: {text}"]
 
 
 def _error(kind: type[HrsynthError], args: tuple[Any, ...]) -> HrsynthError:
-    """An error of a kind, its constructor not called."""
+    """Make an error of a class without calling its constructor."""
     return kind.__new__(kind, *args)
 
 
 def warn_caller(text: str, kind: type[Warning]) -> None:
-    """Warn of something at the line outside of this package from which it was asked."""
+    """Warn at the line outside of this package that called it."""
     level, frame = 1, sys._getframe()
     while frame.f_back is not None and str(frame.f_globals.get("__name__")).partition(".")[0] == "hrsynth":
         level, frame = level + 1, frame.f_back
@@ -41,18 +44,18 @@ def warn_caller(text: str, kind: type[Warning]) -> None:
 
 
 class AssumedBase(UserWarning):
-    """Warning that a file leaves open which link is the base, and which is taken for it."""
+    """Warning that a file does not determine the base; names the link that is assumed."""
 
 
 class AssumedPlatform(UserWarning):
-    """Warning that a file names no platform, and which link is taken for it."""
+    """Warning that a file names no platform; names the link that is assumed."""
 
 
 def compose_message(problem: str, got: str | None, expected: str | None, remedy: str = "") -> str:
     """Return one line: ``problem: got X, expected Y. Remedy.``; parts that are empty are left out."""
     facts = ", ".join([f"got {got}"] * (got is not None) + [f"expected {expected}"] * bool(expected))
     text = f"{problem}: {facts}" if facts else problem
-    return " ".join(f"{text}. {remedy}".split()) if remedy else " ".join(text.split())
+    return " ".join(f"{text.removesuffix('.')}. {remedy}".split()) if remedy else " ".join(text.split())
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,7 @@ class Defect:
 
 
 class BadRobotFile(HrsynthError):
-    """A robot file with its defects, each once, in the order of their lines."""
+    """Robot file with defects, listed once each in the order of their lines."""
 
     def __init__(self, defects: Iterable[Defect]) -> None:
         self.defects = tuple(sorted(dict.fromkeys(defects), key=lambda d: (d.line is None, d.line or 0)))
@@ -88,7 +91,7 @@ class BadRobotFile(HrsynthError):
 
 
 def shorten_text(text: str, length: int = 200) -> str:
-    """A text on one line, cut off at the end if it is too long."""
+    """Return a text on one line, cut off at ``length`` characters."""
     line = " ".join(text.split())
     return line if len(line) <= length else line[: length - 1] + "…"
 
@@ -105,7 +108,7 @@ class BadRequest(HrsynthError):
     expected
         Values that are possible.
     remedy
-        Sentence that says what to do: ``Use x, y or phi.``
+        Next step, a sentence: ``Use x, y or phi.``
     """
 
     def __init__(
@@ -118,28 +121,28 @@ class BadRequest(HrsynthError):
 
 
 class NoPlatform(BadRequest):
-    """A question about a platform, of a robot whose file names none and leaves several that could be."""
+    """Analysis that needs a platform, for a robot whose file names none and has several candidates."""
 
 
 class NoSegment(BadRequest):
-    """A leg without a segment whose direction could be observed: it is one joint, or its links have no length."""
+    """Leg without a segment whose direction can be observed: one joint, or links of length zero."""
 
 
 class FileTooLarge(BadRequest):
-    """A file that is larger than what is accepted: its name, and the limit in bytes."""
+    """File larger than the limit (bytes)."""
 
     def __init__(self, name: str, most: int) -> None:
         self.name, self.most = name, most
-        super().__init__("a file that is too large", name, f"at most {most / 1e6:g} MB")
+        super().__init__(f"{name}: file larger than {most / 1e6:g} MB", remedy="Reduce its meshes.")
 
 
 class BadMechanism(BadRequest):
-    """A mechanism whose parts contradict each other (a joint of an unknown link, a zero axis)."""
+    """Mechanism with contradictory parts, such as a joint of an unknown link or an axis of length zero."""
 
 
 class UndefinedValue(BadRequest):
-    """A measurement that has no value at a configuration: a camera inside the cylinder, or at the point, that it
-    sees."""
+    """Observation without a value at a configuration: a camera inside the observed cylinder, or at the observed
+    point."""
 
 
 class NoResult(HrsynthError):
@@ -150,7 +153,7 @@ class NoResult(HrsynthError):
     problem
         ``ROBOT: goal not met: number with unit``.
     remedy
-        Sentence that says what to do next.
+        Next step, a sentence.
     """
 
     exit_status = 3
@@ -160,125 +163,128 @@ class NoResult(HrsynthError):
 
 
 class LoopsNotClosed(NoResult):
-    """Loops are open: the residual that is left, the loop with the largest miss, and what may help, if known."""
+    """Open kinematic loops: the remaining closure residual and the loop with the largest one."""
 
     def __init__(self, robot: str, residual: float, tolerance: float, loop: str, cure: str = "") -> None:
         self.robot, self.residual, self.tolerance, self.loop = robot, residual, tolerance, loop
         super().__init__(
-            f"{robot}: the loop {loop!r} is open at the zero configuration, residual {residual:.3g} "
-            f"(characteristic lengths, radians), allowed: {tolerance:.3g}" + (f"; {cure}" if cure else "")
+            f"{robot}: loop {loop!r} is open at the zero configuration: closure residual {residual:.3g} "
+            f"(characteristic lengths, rad), tolerance {tolerance:.3g}",
+            cure or "Correct the loop's joint origins, or give them more decimals.",
         )
 
 
 class MotorsNotEnough(NoResult):
-    """At zero the platform can move while all motors are held: too few motors, or a singular zero configuration; with
-    the joints that then move."""
+    """Platform that can move with locked motors: too few motors, or a singular zero configuration; with the joints
+    that move."""
 
     def __init__(self, robot: str, joints: Sequence[str]) -> None:
         self.robot, self.joints = robot, tuple(joints)
         super().__init__(
-            f"{robot}: at the zero configuration the platform can move while all motors are held, through "
-            f"{shorten_text(', '.join(joints))}: its pose is not a function of the motors; add motors, "
-            "or choose another zero configuration"
+            f"{robot}: with locked motors the platform can still move at the zero configuration, through "
+            f"{shorten_text(', '.join(joints))}",
+            "Add motors (--motors), or choose another zero configuration.",
         )
 
 
 class RankUndecided(NoResult):
-    """A rank whose gap is too small for a verdict."""
+    """Rank with a gap too small for a verdict."""
 
     def __init__(self, what: str, gap: float, needed: float) -> None:
         self.what, self.gap, self.needed = what, gap, needed
-        super().__init__(f"{what}: the singular values leave a gap of {gap:.3g}, needed: {needed:.3g}")
+        super().__init__(
+            f"{what}: rank undecided: gap {gap:.3g} between singular values, at least {needed:.3g} needed",
+            "Give the file's numbers more decimals, or choose another configuration.",
+        )
 
 
 class RankBelowRounding(RankUndecided):
-    """Loops that hold directions by no more than what was open: with exact numbers they may move that way."""
+    """Loop constraints as weak as the closure residual: with exact numbers the loops may move that way."""
 
     def __init__(self, robot: str, directions: int, open_by: float) -> None:
         self.robot, self.directions, self.open_by = robot, directions, open_by
-        verb = "holds" if directions == 1 else "hold"
         NoResult.__init__(
             self,
-            f"{robot}: its rounded numbers leave the loops open by {open_by:.1g} (characteristic lengths, "
-            f"radians), and {directions} of their constraints {verb} by no more than that: whether the loops can "
-            "move that way is undecided; give more decimals",
+            f"{robot}: mobility undecided: closure residual {open_by:.1g} from rounded numbers is as large as "
+            f"{directions} singular value{'s' * (directions != 1)} of the loop Jacobian",
+            "Give the numbers more decimals.",
         )
 
 
 class StructureUndecided(NoResult):
-    """Rounded numbers that fit one structure as well as another."""
+    """Rounded numbers that fit two structures equally well."""
 
     def __init__(self, robot: str, tolerance: float, one: str, other: str) -> None:
         self.robot, self.tolerance, self.one, self.other = robot, tolerance, one, other
         super().__init__(
-            f"{robot}: the rounded numbers fit two robots to {tolerance:.1g} (characteristic "
-            f"lengths, radians): one with {one}, one with {other}; give more decimals, another "
-            "--tolerance, or --as-written"
+            f"{robot}: rounded numbers fit two robots within {tolerance:.1g} (characteristic lengths, rad): "
+            f"one with {one}, one with {other}",
+            "Give more decimals, another --tolerance, or --as-written.",
         )
 
 
 class NotSampled(NoResult):
-    """Too few closed configurations could be reached from the zero configuration, in how many ``tries``."""
+    """Too few samples reached from the zero configuration in a number of random walks (``tries``)."""
 
     def __init__(self, robot: str, reached: int, wanted: int, tries: int) -> None:
         self.robot, self.reached, self.wanted, self.tries = robot, reached, wanted, tries
         super().__init__(
-            f"{robot}: of {tries} random walks from the zero configuration only {reached} led to a "
-            f"configuration that counts, needed: {wanted}; the others came near a singularity or left the "
-            "branch: start away from it (--at POSE, --keyframe NAME), or give the file's numbers more "
-            "digits"
+            f"{robot}: {reached} samples from {tries} random walks, {wanted} needed: the other walks came near a "
+            "singularity or left the branch",
+            "Start elsewhere (--at POSE, --keyframe NAME), or give the file's numbers more decimals.",
         )
 
 
 class InfinitesimalMobility(NoResult):
-    """A mechanism whose loops allow more motion to first order than it really has, wherever it goes."""
+    """Mechanism that is infinitesimally mobile at all samples: its mobility to first order exceeds its finite
+    mobility."""
 
     def __init__(self, robot: str, allowed: int, done: int) -> None:
         self.robot, self.allowed, self.done = robot, allowed, done
         super().__init__(
-            f"{robot}: shaky wherever it was tried: to first order its loops have mobility {allowed}, but "
-            f"it can move on in only {done} way{'s' * (done != 1)}; no verdict is given, since all ranks "
-            "here are of first order"
+            f"{robot}: infinitesimally mobile at all samples: mobility {allowed} to first order, {done} in finite "
+            "motion; verdicts use first-order ranks",
+            "Change the geometry, or lock the joints concerned with --freeze.",
         )
 
 
 class BranchPoint(NoResult):
-    """A zero configuration at which several operation modes meet, or samples from several: what was found of each, and
-    a pose in it."""
+    """Zero configuration at which several operation modes meet, or samples from several; describes each mode with a
+    pose in it."""
 
     def __init__(self, robot: str, what: str, modes: Iterable[str]) -> None:
         self.robot, self.what, self.modes = robot, what, tuple(modes)
         super().__init__(
-            f"{robot}: {what}: "
-            + "; ".join(f"({i}) {mode}" for i, mode in enumerate(self.modes, 1))
-            + "; no verdict is given; start in one of them"
+            f"{robot}: {what}: " + "; ".join(f"({i}) {mode}" for i, mode in enumerate(self.modes, 1)),
+            "Start in one of them (--at POSE).",
         )
 
 
 class GeometryAmbiguous(NoResult):
-    """Whether a special geometry is meant: the largest defect that would be accepted, the smallest that would not (both
-    in sizes of the mechanism), and how far apart they must be."""
+    """Nearly special geometry: the largest deviation that would be snapped, the smallest that would not (both in
+    characteristic lengths), and the ratio needed between them."""
 
     def __init__(self, what: str, largest: float, smallest: float, gap: float) -> None:
         super().__init__(
-            f"{what} are {largest:.2g} sizes of the mechanism apart, others {smallest:.2g}: not "
-            f"{gap:g} times as far, so it is not clear which are meant; --as-written takes the "
-            "numbers as they are"
+            f"{what}: geometry ambiguous: some are {largest:.2g} characteristic lengths apart, others "
+            f"{smallest:.2g}, and the ratio is below {gap:g}",
+            "Give more decimals, or use --as-written.",
         )
 
 
 class NothingProved(NoResult):
-    """A branch of which no cell at all is proved, and why: there is no function to write."""
+    """Branch without a proved cell, so that no code can be generated, and the reason."""
 
     def __init__(self, robot: str, motors: Iterable[str], reason: str) -> None:
         super().__init__(
-            f"{robot}: no code is written: around the zero configuration nothing is proved for "
-            f"{', '.join(motors)}{': ' * bool(reason)}{reason}; try a smaller box (--box)"
+            f"{robot}: no code generated: no cell around the zero configuration is proved for "
+            f"{', '.join(motors)}{': ' * bool(reason)}{reason}",
+            "Try a smaller box (--box).",
         )
 
 
 class LegMiss(NamedTuple):
-    """A leg that alone misses a goal by so much (m, rad), or at least by so much."""
+    """Distance (m, rad) by which a leg alone misses a goal; ``at_least``: a lower bound."""
 
     leg: str
     length: float
@@ -287,10 +293,9 @@ class LegMiss(NamedTuple):
 
 
 class PoseNotReached(NoResult):
-    """A pose that the robot does not reach from ``origin``: the leg that misses it most and by how much (mm, degrees;
-    at least, as rods tell it), or None if each leg alone reaches it; how far the robot came (0 to 1), and to which
-    pose; the ``wrist``, a joint that stands for several R, that is near the end of its turns there; ``why`` all legs
-    together do not get there, if that is known; or another ``reason`` instead of these."""
+    """Pose that the robot does not reach from ``origin``: the leg with the largest distance to it (mm, degrees), or
+    None if each leg alone reaches it; the part of the path travelled (``came``, 0 to 1) and the last pose; a joint near
+    its tilt limit there (``wrist``); the reason why the legs together fail (``why``), or another ``reason``."""
 
     def __init__(
         self,
@@ -312,13 +317,13 @@ class PoseNotReached(NoResult):
         self.others: tuple[PoseNotReached, ...] = ()
         if reason is None:
             if wrist is not None:
-                reason = f"joint {wrist}, which stands for several R through one point, is near the end of its turns"
+                reason = f"joint {wrist}, which replaces several R through one point, is near its tilt limit"
             elif miss is None:
                 reason = "each leg alone can close there, but " + (
                     why
                     or (
-                        "the straight path to it is blocked (all legs together do not reach so far, a leg is at its "
-                        "limit, or it is another working mode)"
+                        "the straight path to it is blocked (out of reach of all legs together, a leg at its limit, "
+                        "or another working mode)"
                     )
                 )
             else:
@@ -326,157 +331,163 @@ class PoseNotReached(NoResult):
                 least = "at least " * miss.at_least
                 reason = f"leg {miss.leg} alone misses it by {least}{self.millimetres:.4g} mm{turn}"
             part = "more than 99.9" if 0.999 < came < 1 else f"{100 * came:.3g}"
-            reason += f"; from {origin} the robot gets {part} % of the way, to {last}"
+            reason += f"; from {origin} the robot gets {part} % of the path, to {last}"
         self.reason = reason
-        super().__init__(f"{robot}: the pose {pose} is not reached: {self.reason}")
+        super().__init__(f"{robot}: the pose {pose} is not reached: {self.reason}", "Choose a nearer pose.")
 
     @classmethod
     def of_all(cls, refused: Sequence[PoseNotReached]) -> PoseNotReached:
-        """The first of several poses that are not reached; it reports one line for each."""
+        """Return the first of several poses that are not reached; it reports one line for each."""
         refused[0].others = tuple(refused[1:])
         return refused[0]
 
     def lines(self) -> list[str]:
-        """One line for this pose, and one for each of the others."""
+        """Return one line for this pose, and one for each of the others."""
         return super().lines() + [line for each in self.others for line in each.lines()]
 
 
 class NoReachablePose(NoResult):
-    """A plane or grid of poses none of which the robot reaches, and why; that their parts depend on each other."""
+    """Plane or grid without a reachable pose, the reason, and a dependence between its coordinates."""
 
     def __init__(self, robot: str, plane: str, reason: str, dependent: str | None = None) -> None:
         reason += f"; {dependent}" if dependent else ""
         self.robot, self.plane, self.reason = robot, plane, reason
-        super().__init__(f"{robot}: no pose of {plane} is reached: {reason}")
+        super().__init__(f"{robot}: no pose of {plane} is reached: {reason}", "Choose other poses.")
 
 
 class Disagreement(NoResult):
-    """The words, the expression and the rank do not agree about where a robot is singular."""
+    """Disagreement between the singularity condition and the rank."""
 
     def __init__(self, robot: str, poses: int, angle: float) -> None:
         self.robot, self.poses, self.angle = robot, poses, angle
         super().__init__(
-            f"{robot}: the condition and the rank disagree at {poses} poses (a leg's wrenches by up to "
-            f"{angle:.2g} rad); please report this as a defect of hrsynth"
+            f"{robot}: the condition and the rank disagree at {poses} poses (leg wrenches differ by up to "
+            f"{angle:.2g} rad)",
+            "Report this as a defect of hrsynth, with the robot file.",
         )
 
 
 class UnsupportedLocus(NoResult):
-    """A robot whose tips, with the directions held, move on something other than points, lines and circles."""
+    """Robot whose locked legs have loci without a supported closed form."""
 
     def __init__(self, robot: str, reason: str) -> None:
         self.robot, self.reason = robot, reason
-        super().__init__(f"{robot}: its assembly modes cannot be listed, not supported here: {reason}")
+        super().__init__(
+            f"{robot}: assembly modes cannot be listed: {reason}",
+            "Observe other legs, or remove the feature that the message names.",
+        )
 
 
 class NotConfirmed(NoResult):
-    """An architecture without an exact verdict that closed configurations confirm, and why."""
+    """Architecture without an exact verdict that samples confirm, and the reason."""
 
     def __init__(self, robot: str, what: str) -> None:
         self.robot, self.what = robot, what
-        super().__init__(f"{robot}: no confirmed verdict: {what}")
+        super().__init__(f"{robot}: no confirmed verdict: {what}", "Analyse it numerically with hrsynth derive.")
 
 
 class NoEquivalentRobot(NoResult):
-    """No hidden robot passed the certificate: the best angle seen."""
+    """No candidate passed the equivalence check; with the smallest angle between velocity relations."""
 
     def __init__(self, robot: str, angle: float, tolerance: float) -> None:
         self.robot, self.angle, self.tolerance = robot, angle, tolerance
         super().__init__(
-            f"{robot}: no hidden robot passed the certificate, largest angle {angle:.3g}, allowed: {tolerance:.3g}"
+            f"{robot}: no hidden robot passed the equivalence check: largest angle {angle:.3g} rad, tolerance "
+            f"{tolerance:.3g} rad",
+            "Start away from dead points (--at POSE), or observe other legs.",
         )
 
 
 class NoCertificate(NoResult):
-    """A list of modes, or a verdict, for which there is no certificate, and why."""
+    """Result for which no certificate can be written, and the reason."""
 
     def __init__(self, robot: str, reason: str) -> None:
         self.robot, self.reason = robot, reason
-        super().__init__(f"{robot}: no certificate: {reason}")
+        super().__init__(f"{robot}: no certificate: {reason}", "Omit --certificate.")
 
 
 class CertificateRefused(NoResult):
-    """A certificate that the checker does not accept: which, and why."""
+    """Certificate that the checker does not accept, and the reason."""
 
     def __init__(self, source: str, reason: str) -> None:
         self.source, self.reason = source, reason
-        super().__init__(f"{source}: refused: {reason}")
+        super().__init__(f"{source}: refused: {reason}", "Write the certificate again with hrsynth.")
 
 
 class MissingExtra(NoResult):
-    """Something that needs an optional package which is not installed: what, and the extra that installs it."""
+    """Optional package that is not installed: what needs it, and the extra that installs it."""
 
     met: ClassVar[int] = 0
-    """How often that happened: an answer that goes on without a package is not remembered."""
+    """Number of these errors so far; results computed without an optional package are not cached."""
 
     def __init__(self, what: str, extra: str) -> None:
         self.what, self.extra = what, extra
-        self.reason = (
-            f"{what} needs an optional package: {sys.executable or 'python'} -m pip install "
-            f'"hrsynth[{extra}]", in a checkout -m pip install ".[{extra}]"'
-        )
+        install = f"{sys.executable or 'python'} -m pip install"
+        remedy = f'Run {install} "hrsynth[{extra}]", or in a checkout {install} ".[{extra}]".'
+        self.reason = compose_message(f"{what} needs an optional package", None, None, remedy)
         MissingExtra.met += 1
         super().__init__(self.reason)
 
 
 class SystemNotSolved(NoResult):
-    """An external solver that gave no answer: which, and why."""
+    """Solver without a result, and the reason."""
 
     def __init__(self, solver: str, reason: str) -> None:
         self.solver, self.reason = solver, reason
-        super().__init__(f"{solver} did not solve the system: {reason}")
+        super().__init__(f"{solver}: system not solved: {reason}", "Observe other legs, or raise --time-limit.")
 
 
 class TooLarge(NoResult):
-    """A system that needs more effort than is allowed: what, how large it is, the estimated time in seconds, and the
-    limit."""
+    """System whose estimated time (s) exceeds the time limit."""
 
     def __init__(self, what: str, size: str, needed: float, effort: float) -> None:
         self.needed = needed
-        self.reason = f"{what}, {size}, needs about {needed:g} s, more than the effort of {effort:g} s"
-        super().__init__(self.reason)
+        self.reason = f"{what}, {size}, needs about {needed:g} s, more than the time limit of {effort:g} s"
+        super().__init__(self.reason, "Raise --time-limit.")
 
 
 class NotRendered(NoResult):
-    """Pictures that cannot be rendered on this machine, and why."""
+    """Images that cannot be rendered on this machine, and the reason."""
 
     def __init__(self, reason: str) -> None:
         self.reason = reason
-        super().__init__(f"pictures cannot be rendered here: {reason} (MUJOCO_GL chooses between egl, osmesa and glfw)")
+        super().__init__(f"images cannot be rendered here: {reason}", "Set MUJOCO_GL to egl, osmesa or glfw.")
 
 
 class NeedsPosix(NoResult):
-    """Something that this operating system does not offer: what needs it, and the module that is missing."""
+    """Function that this operating system does not provide, and the missing module."""
 
     def __init__(self, what: str, module: str) -> None:
         self.what, self.module = what, module
-        super().__init__(f"{what} needs a POSIX system: this Python has no module {module}")
+        super().__init__(f"{what} needs a POSIX system: this Python has no module {module}", "Use Linux, macOS or WSL.")
 
 
 class WorkersLost(NoResult):
-    """Processes that share work and ended before it was done, and why."""
+    """Worker processes that ended before their work was done, and the reason."""
 
     def __init__(self, reason: str) -> None:
         self.reason = reason
-        super().__init__(f"{reason}: it may have run out of memory; fewer processes (--jobs) need less")
+        super().__init__(f"{reason}, perhaps for lack of memory", "Use fewer processes (--jobs).")
 
 
 class BuildStopped(NoResult):
-    """A build of the catalog, or a sweep to a file, that cannot continue: why, and the journal that keeps what was
-    done, if any."""
+    """Build of the catalog, or sweep to a file, that cannot continue: the reason, and the journal of finished work."""
 
     def __init__(self, reason: str, kept: str | None = None, what: str = "build") -> None:
         self.reason, self.kept = reason, kept
-        rest = "" if kept is None else f"; what was built is kept in {kept}; the same command continues"
-        super().__init__(f"the {what} stopped: {reason}{rest}")
+        text = f"the {what} stopped: {reason}"
+        if kept is not None:
+            super().__init__(f"{text}; finished work is kept in {kept}", "Repeat the command to continue.")
+        else:
+            super().__init__(text, "Repeat the command.")
 
 
 class CatalogStale(NoResult):
-    """A stored catalog that differs from what would be built today: what differs, one line each."""
+    """Stored catalog that differs from what would be built today, one line per difference."""
 
     def __init__(self, complaints: Iterable[str]) -> None:
         self.complaints = tuple(complaints)
-        super().__init__("; ".join(self.complaints))
+        super().__init__("; ".join(self.complaints), "Build it again with hrsynth catalog build.")
 
     def lines(self) -> list[str]:
         return list(self.complaints)

@@ -1,7 +1,6 @@
-"""The index of the public functions, made of their declarations: ``make index`` writes ``index.json`` and
-``__init__.pyi`` anew.
+"""Index of the public functions, from their declarations: ``make index`` writes ``index.json`` and ``__init__.pyi``.
 
-``import hrsynth`` and the help of the command line read it instead of loading what computes.
+``import hrsynth`` and the help of the command line read it instead of loading the analyses.
 """
 
 from __future__ import annotations
@@ -31,12 +30,12 @@ HELPERS = {
     "present.studio.server": ("studio",),
     "progress": ("on_progress",),
 }
-"""Public functions that are no analyses of a robot, by their module."""
+"""Public functions other than analyses of a robot, by module."""
 
 
 @cache
 def analyses() -> dict[str, dict[str, Any]]:
-    """What is declared of each analysis, by its name, in the order of lists."""
+    """Return the declaration of each analysis by name, in the order of lists."""
     if not PACKAGE.is_dir():  # in an archive, which the command line refuses
         return {}
     found: dict[str, dict[str, Any]] = json.loads(INDEX.read_text(encoding="utf-8"))
@@ -45,18 +44,18 @@ def analyses() -> dict[str, dict[str, Any]]:
 
 @cache
 def homes() -> dict[str, str]:
-    """The module of each public function, below the package."""
+    """Return the module of each public function, below the package."""
     helpers = {name: module for module, names in HELPERS.items() for name in names}
     return helpers | {name: each["module"] for name, each in analyses().items()}
 
 
 def options(name: str) -> list[Option]:
-    """The options of an analysis."""
+    """Return the options of an analysis."""
     return [_read(each) for each in analyses()[name]["options"]]
 
 
 def _told(option: Option) -> dict[str, Any]:
-    """An option as the index has it: what differs from the defaults."""
+    """Encode an option for the index: the fields that differ from the defaults."""
     default = {each.name: each.default for each in fields(Option)}
     told = {name: value for name, value in asdict(option).items() if value != default[name]}
     kind = next(name for name, each in KINDS.items() if each == option.kind)
@@ -65,7 +64,7 @@ def _told(option: Option) -> dict[str, Any]:
 
 
 def _read(told: dict[str, Any]) -> Option:
-    """The option that was told."""
+    """Decode an option of the index."""
     given: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in told.items()}
     given["kind"] = KINDS[given["kind"]]
     if given.pop("needed", False):
@@ -74,7 +73,7 @@ def _read(told: dict[str, Any]) -> Option:
 
 
 def declared() -> dict[str, dict[str, Any]]:
-    """The same as the modules declare it, all of which are loaded."""
+    """Collect the declarations from the modules, all of which are loaded."""
     found: dict[int, tuple[str, dict[str, Any]]] = {}
     for path in sorted(PACKAGE.rglob("*.py")):
         if MARK not in path.read_text(encoding="utf-8"):
@@ -97,13 +96,13 @@ def declared() -> dict[str, dict[str, Any]]:
 
 
 def index_text() -> str:
-    """What ``index.json`` should hold."""
+    """Return the content of ``index.json``."""
     rows = [f'"{name}": {json.dumps(each, ensure_ascii=False)}' for name, each in declared().items()]
     return "{\n" + ",\n".join(rows) + "\n}\n"
 
 
 def stub_text() -> str:
-    """What ``__init__.pyi`` should hold: the public functions with their types, for editors and type checkers."""
+    """Return the content of ``__init__.pyi``: public functions with types, for editors and type checkers."""
     places = homes()
     lines = ['"""Made by make index."""', "", "from . import catalog as catalog"]
     lines += [
@@ -114,7 +113,7 @@ def stub_text() -> str:
 
 
 def write() -> None:
-    """Write both files anew."""
+    """Write both files."""
     INDEX.write_text(index_text(), encoding="utf-8")
     analyses.cache_clear()
     homes.cache_clear()

@@ -1,7 +1,7 @@
-"""What can be asked: options as data, each declared once.
+"""Options as data, each declared once.
 
-Where a public function takes one, it stands in its annotation (:func:`option`); name, kind and default are those of the
-parameter. The command line, its help and completion, and what Python checks follow from that.
+Options of a public function are declared in its annotations (:func:`option`); name, kind and default are those of the
+parameter. The command line, its help and completion, and the checks in Python follow from them.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from .errors import BadRequest
 from .records import resolve_hints
 
 NEEDED: Any = ...
-"""The default of what must be given."""
+"""Default of a required option."""
 OWN, OBSERVATION, OUTPUT, OVERRIDES = "Options", "Observation", "Output", "File overrides"
 """Groups of options, in the order of the help."""
 
 
 @dataclass(frozen=True)
 class Option:
-    """One option or (``argument``) one word of the command line; ``flags`` are its names, by default its own;
-    ``words`` are what its value can be, where that is known."""
+    """Option or (``argument``) positional argument of the command line; ``flags``: its names, by default from
+    ``name``; ``words``: its possible values, if known."""
 
     name: str
     help: str
@@ -41,23 +41,23 @@ class Option:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Its names on the command line: none of an argument, ``--open/--no-open`` of a flag that can be denied."""
+        """Names on the command line: none of an argument, ``--open/--no-open`` of a flag with a negation."""
         return () if self.argument else self.flags or (f"--{self.name.replace('_', '-')}",)
 
     @property
     def value(self) -> str:
-        """How the help calls what is given."""
+        """Placeholder of the value in the help."""
         return self.metavar or {int: "COUNT", float: "NUMBER"}.get(self.kind, self.name.upper())
 
     @property
     def shown(self) -> str:
-        """How the help names it."""
+        """Names and placeholder in the help."""
         names = ", ".join(self.names).replace("/", " / ")
         return f"{names} {'' if self.kind is bool else self.value}".strip()
 
     @property
     def told(self) -> str:
-        """What the help says of it: what it is for, its default, its range."""
+        """Text in the help, with default and range."""
         given = not isinstance(self.default, bool) and self.default not in (NEEDED, None, "")
         facts = [f"default: {self.default}"] if given else ["required"] if self.default is NEEDED else []
         facts += [] if self.low is None else [f"at least {self.low}"]
@@ -66,16 +66,16 @@ class Option:
 
     @property
     def several(self) -> bool:
-        """Whether it can be given more than once."""
+        """True if it can be given more than once."""
         return self.kind == list[str]
 
     @property
     def names_several(self) -> bool:
-        """Whether one value names several things, so that a second value would not be taken for the only one."""
+        """True if one value is a list of names; repeating the option is then an error."""
         return self.metavar in ("LEGS", "LINKS", "JOINTS")
 
     def typed(self, value: Any) -> list[str]:
-        """The words of the command line that give a value; none for the default and what stands for none."""
+        """Return the words of the command line for a value; none for the default or an empty value."""
         if value in (None, "", (), [], self.default):
             return []
         if self.kind is bool:
@@ -84,7 +84,7 @@ class Option:
         return [word for part in each for word in (self.names[0], as_typed(part))]
 
     def read(self, text: str) -> Any:
-        """A value as it is written on the command line; raises ``BadRequest``."""
+        """Convert the text of a value; raises ``BadRequest``."""
         if self.kind not in (int, float):
             return text
         try:
@@ -99,27 +99,27 @@ class Option:
 
 
 def flag(name: str, help: str, group: str = OWN) -> Option:
-    """An option that is given or not."""
+    """Make an option without a value."""
     return Option(name, help, kind=bool, default=False, group=group)
 
 
 def output(help: str, metavar: str = "FILE", default: Any = None) -> Option:
-    """What is written with ``-o``."""
+    """Make the option ``-o``."""
     return Option("output", help, metavar, default=default, flags=("-o", "--output"), group=OUTPUT)
 
 
 def as_typed(value: Any) -> str:
-    """A value as it is typed: several names with commas."""
+    """Return the text of a value; several names are joined by commas."""
     return ",".join(map(str, value)) if isinstance(value, tuple | list) else str(value)
 
 
 def option(help: str, metavar: str | None = None, **more: Any) -> Option:
-    """An option of the parameter that it annotates."""
+    """Make the option of the parameter that it annotates."""
     return Option("", help, metavar, **more)
 
 
 def options_of(function: Callable[..., Any]) -> Iterator[Option]:
-    """The options of a function's parameters, or of a dataclass's fields, in their order."""
+    """Yield the options of a function's parameters, or of a dataclass's fields, in order."""
     place = vars(sys.modules[function.__module__])
     for name, parameter in signature(function).parameters.items():
         hint, *extras = _annotated(parameter.annotation, place)
@@ -130,7 +130,7 @@ def options_of(function: Callable[..., Any]) -> Iterator[Option]:
 
 
 def kinds_of(function: Callable[..., Any]) -> dict[str, list[str]]:
-    """The types of a function's parameters by their names: ``["int", "None"]``."""
+    """Return the types of a function's parameters by name: ``["int", "None"]``."""
     place = vars(sys.modules[function.__module__])
     found = {}
     for name, parameter in signature(function).parameters.items():
@@ -141,7 +141,7 @@ def kinds_of(function: Callable[..., Any]) -> dict[str, list[str]]:
 
 
 def plain_signature(function: Callable[..., Any]) -> Signature:
-    """A function's signature without what annotates its types."""
+    """Return a function's signature without annotations beyond types."""
     known = signature(function)
     plain = [
         each.replace(annotation=str(each.annotation).removeprefix("Annotated[").partition(", option(")[0])
@@ -153,7 +153,7 @@ def plain_signature(function: Callable[..., Any]) -> Signature:
 
 
 def _annotated(annotation: Any, place: dict[str, Any]) -> tuple[Any, ...]:
-    """A type and what annotates it; what is annotated by a type alone is not looked at."""
+    """Return a type and its annotations; plain types are not resolved."""
     if isinstance(annotation, str):
         if not annotation.startswith("Annotated[") and get_origin(place.get(annotation)) is not Annotated:
             return (annotation,)
@@ -162,29 +162,29 @@ def _annotated(annotation: Any, place: dict[str, Any]) -> tuple[Any, ...]:
 
 
 def _kind(hint: Any) -> Any:
-    """What is read for a type: a number or a flag for these, perhaps with None, otherwise a text."""
+    """Return the kind of an option: number or flag, perhaps with None, otherwise text."""
     kinds = {each for each in get_args(hint) or (hint,) if each is not NoneType}
     return kinds.pop() if kinds in ({bool}, {int}, {float}) else str
 
 
 def range_words(low: float | None, high: float | None) -> list[str]:
-    """A range in words."""
+    """Return a range in words."""
     return [f"at {end} {value:g}" for end, value in (("least", low), ("most", high)) if value is not None]
 
 
 def in_range(value: float, low: float | None, high: float | None) -> bool:
-    """Whether a number is in a range; not a number is in none that has an end."""
+    """Return True if a number is in a range; NaN is in no bounded range."""
     return (low is None or value >= low) and (high is None or value <= high)
 
 
 def require_range(name: str, value: float, word: str, low: float | None, high: float | None = None) -> None:
-    """Raise ``BadRequest`` for a value that is not between two numbers."""
+    """Raise ``BadRequest`` for a value outside of a range."""
     if not in_range(value, low, high):
         raise BadRequest(name, value, ", ".join([word, *range_words(low, high)]))
 
 
 def plain_number(text: str, kind: type = float) -> Any:
-    """The number that a user writes, in ASCII digits without underscores; raises ``ValueError``."""
+    """Convert a number in ASCII digits without underscores; raises ``ValueError``."""
     if not text.isascii() or "_" in text:
         raise ValueError(text)
     return kind(text)

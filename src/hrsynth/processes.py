@@ -1,5 +1,4 @@
-"""Work that several processes share; they end with the process that shares it out, however that ends. What needs more
-of the operating system than Python has everywhere."""
+"""Work shared among processes, which end with their parent; checks of the operating system."""
 
 from __future__ import annotations
 
@@ -15,12 +14,12 @@ from typing import TypeVar
 from .errors import NeedsPosix, WorkersLost
 
 PARENT_WATCH = 0.5
-"""Seconds within which a worker notices that its parent has ended."""
+"""Interval at which a worker checks that its parent is alive (s)."""
 T = TypeVar("T")
 
 
 def require_posix(what: str, *modules: str) -> None:
-    """Raise ``NeedsPosix`` where one of the modules is missing."""
+    """Raise ``NeedsPosix`` if one of the modules is missing."""
     for module in modules:
         try:
             import_module(module)
@@ -29,9 +28,10 @@ def require_posix(what: str, *modules: str) -> None:
 
 
 def run_shared(works: Iterable[Callable[[], T]], jobs: int, *, ordered: bool = True) -> Generator[T, None, None]:
-    """What each piece of work gives, by ``jobs`` processes, with 1 in this one: in order, or as it comes. The rest is
-    given up where the generator is closed. Raises ``WorkersLost``, and what a piece of work raises: with several
-    processes as soon as it does.
+    """Yield the result of each piece of work, in order or as it is ready, from ``jobs`` processes (1: this one).
+
+    Closing the generator cancels the remaining work. Raises ``WorkersLost``, and the errors of the work: with several
+    processes immediately.
     """
     if jobs <= 1:
         yield from (work() for work in works)
@@ -39,7 +39,7 @@ def run_shared(works: Iterable[Callable[[], T]], jobs: int, *, ordered: bool = T
     from joblib import Parallel, delayed
     from joblib.externals.loky.process_executor import BrokenProcessPool, TerminatedWorkerError
 
-    # nothing is passed through shared memory, which would be left there
+    # no shared memory, which a killed process would leave behind
     pool = Parallel(
         n_jobs=jobs,
         batch_size=1,
@@ -62,7 +62,7 @@ def run_shared(works: Iterable[Callable[[], T]], jobs: int, *, ordered: bool = T
 
 
 def _end_with_parent(parent: int) -> None:
-    """Make this process end with its parent, which alone answers Ctrl-C."""
+    """End this process with its parent, which alone handles Ctrl-C."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Thread(target=_watch, args=(parent,), daemon=True).start()
 

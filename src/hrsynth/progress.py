@@ -1,4 +1,4 @@
-"""What a long question is at: told by whatever works, heard by whoever follows, through no signature in between."""
+"""Progress through a context variable: :func:`report` emits a stage, :func:`on_progress` subscribes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _part: ContextVar[str] = ContextVar("part", default="")
 
 
 def report(stage: str) -> None:
-    """Report one more step of a stage of the question that is being answered."""
+    """Report one more step of a stage of the running analysis."""
     listener = _listener.get()
     if listener is not None:
         listener(_part.get() + stage)
@@ -19,7 +19,7 @@ def report(stage: str) -> None:
 
 @contextmanager
 def part(name: str) -> Iterator[None]:
-    """Report each stage within as one of a part of the question, as ``set 3 of 20: modes``."""
+    """Prefix stages reported within by the name of a part, as ``set 3 of 20: modes``."""
     token = _part.set(f"{_part.get()}{name}: ")
     try:
         yield
@@ -29,8 +29,24 @@ def part(name: str) -> Iterator[None]:
 
 @contextmanager
 def on_progress(listener: Callable[[str], None]) -> Iterator[None]:
-    """Report each step of all that is asked within to a function: ``with following(print): derive(robot)``.
+    """Call a function with the stage of each step of analyses in a ``with`` block.
 
+    Parameters
+    ----------
+    listener : callable
+        Function of one text, the name of the stage, such as ``print``.
+
+    Returns
+    -------
+    context manager
+        Restores the previous listener at its end.
+
+    Notes
+    -----
+    The listener belongs to the context: other threads do not report to it.
+
+    Examples
+    --------
     >>> stages = []
     >>> with hrsynth.on_progress(stages.append):
     ...     found = hrsynth.observe("3rrr_m1", seed=7)

@@ -1,15 +1,15 @@
-"""What a result tells, said once beside its values: JSON, JSON schema, reference and rows of tables follow from that.
+"""Fields of results, described once beside their values: JSON, JSON schema, reference and table rows follow.
 
 A member of a record is
 
 * a field of a dataclass that is :data:`Recorded` or annotated with more than its type:
-  ``Annotated[float, As("time_s"), "when it ended"]``. Of what stands behind the type, a text says what it is,
-  :class:`As` how it is told, and anything else is its type in JSON where that differs:
+  ``Annotated[float, As("time_s"), "end time"]``. After the type, a text is the description,
+  :class:`As` the form in JSON, and anything else the type in JSON if it differs:
   ``Annotated[Array, list[float], "low ends (m, rad)"]``;
 * a property under :func:`recorded`;
-* :class:`Shown`, a value that only the record has.
+* :class:`Shown`, a value of the record alone.
 
-Named tuples and typed dictionaries, whose members are all told, stand for what has no class of its own.
+All members of named tuples and typed dictionaries are recorded.
 """
 
 from __future__ import annotations
@@ -39,28 +39,28 @@ from typing import (
 
 Json = Any
 Number = float | None
-"""A number, null where there is none or it is infinite."""
+"""Number, null if it is undefined or infinite."""
 Table = list[Any]
-"""Arrays over a grid, nested in the order of its axes."""
+"""Array over a grid, nested in the order of its axes."""
 SIMPLE: dict[Any, str] = {str: "string", int: "integer", float: "number", bool: "boolean", NoneType: "null"}
-ANGLE = "the largest principal angle between two relations (rad)"
+ANGLE = "the largest principal angle between two velocity relations (rad)"
 GAP = "the smallest ratio of a singular value that counts to one that does not"
-"""What is said of numbers that many records hold."""
+"""Descriptions of numbers in several records."""
 Word = Literal["controllable", "partially controllable", "uncontrollable", "nothing to control", "rigid", "flexible"]
-"""What can be said of what is seen of a robot, or of a formation."""
+"""Verdicts on the observations of a robot, or of a formation."""
 MM, DEG = 1e3, degrees(1.0)
-"""Scales of what is told in millimetres or degrees."""
+"""Scales to millimetres and degrees."""
 F = TypeVar("F", bound=Callable[..., Any])
 T = TypeVar("T")
 Recorded = Annotated[T, ""]
-"""A field that is told under its name and with its type, of which no more is said."""
+"""Field with the name and type of the attribute, without a description."""
 
 
 @dataclass(frozen=True)
 class As:
-    """How a member is told: under which ``name``, times a ``scale``, rounded to ``digits``; ``flat``: its own members,
-    but those ``without``, stand in its place; ``optional``: it is left out where it is None; ``scaled``: it is told
-    times the scale of the member that holds its record."""
+    """Form of a member in JSON: its ``name``, multiplied by ``scale``, rounded to ``digits``; ``flat``: replaced by its
+    own members except ``without``; ``optional``: omitted if it is None; ``scaled``: multiplied by the scale of the
+    member that contains its record."""
 
     name: str | None = None
     scale: float | None = None
@@ -76,7 +76,7 @@ FLAT, OPTIONAL, SCALED = As(flat=True), As(optional=True), As(scaled=True)
 
 @dataclass(frozen=True)
 class Member:
-    """A member of a record: where its value comes from, its type in JSON, how it is told, what it is."""
+    """Member of a record: source of its value, type and form in JSON, description."""
 
     name: str
     attribute: str
@@ -86,7 +86,7 @@ class Member:
 
 
 class Record:
-    """What tells its members as JSON; all fields of a dataclass that is declared ``all_recorded``."""
+    """Base of classes with JSON; with ``all_recorded`` all fields of the dataclass are members."""
 
     all_recorded: ClassVar = False
 
@@ -95,17 +95,17 @@ class Record:
         cls.all_recorded = all_recorded
 
     def to_dict(self) -> Json:
-        """The members by name, as JSON has them: null for what is not finite."""
+        """Return the members by name for JSON; null if not finite."""
         return _members_of(self)
 
     def to_row(self) -> dict[str, Any]:
-        """The same in one level, a row of a table (``pandas.DataFrame([found.to_row(), ...])``): members of members are
-        named with dots."""
+        """Return the members in one level, for a table row (``pandas.DataFrame([found.to_row(), ...])``); nested names
+        are joined by dots."""
         return dict(_flat(self.to_dict()))
 
 
 class Shown:
-    """A value that only the record has: its type in JSON, how it is made of what has it, and as in an annotation."""
+    """Value of a record alone: its type in JSON, the function that computes it, and annotations."""
 
     def __init__(self, kind: Any, get: Callable[[Any], Any], *extras: Any) -> None:
         self.kind, self.get, self.extras = kind, get, extras
@@ -115,7 +115,7 @@ class Shown:
 
 
 def recorded(*extras: Any) -> Callable[[F], F]:
-    """A property that the record has too: ``@property`` stands above, what is told as in an annotation in brackets."""
+    """Make a property a member of the record: below ``@property``, with annotations as arguments."""
 
     def marked(function: F) -> F:
         function.recorded = extras  # type: ignore[attr-defined]
@@ -125,14 +125,14 @@ def recorded(*extras: Any) -> Callable[[F], F]:
 
 
 class Head(TypedDict):
-    """The fields with which every object of the command line begins."""
+    """First fields of every JSON object of the command line."""
 
     command: str
     version: str
 
 
 class Platform(TypedDict):
-    """The link that is the platform (the first body of a formation; null where it is open); what chose it, and why."""
+    """The platform link (null if open; of a formation its first body), the origin of the choice, and the reason."""
 
     link: str | None
     chosen: Literal["file", "option", "assumption", "open"]
@@ -140,14 +140,14 @@ class Platform(TypedDict):
 
 
 class OfRobot(Head):
-    """The fields with which an answer about a robot begins."""
+    """First fields of a result on a robot."""
 
     robot: str
     platform: Platform
 
 
 def _members_of(value: Any, scale: float | None = None) -> dict[str, Any]:
-    """The members of a record or a named tuple."""
+    """Return the members of a record or a named tuple."""
     found: dict[str, Any] = {}
     for member in members(type(value)):  # type: ignore[arg-type]
         how = replace(member.how, scale=scale) if member.how.scaled else member.how
@@ -160,7 +160,7 @@ def _members_of(value: Any, scale: float | None = None) -> dict[str, Any]:
 
 
 def plain(value: Any, how: As = As()) -> Any:
-    """A value as JSON has it."""
+    """Convert a value for JSON."""
     if value is None or isinstance(value, bool | str):
         return value
     if hasattr(value, "to_dict"):
@@ -190,7 +190,7 @@ def _flat(fields: Mapping[str, Any], at: str = "") -> Iterator[tuple[str, Any]]:
 
 @cache
 def members(kind: type) -> tuple[Member, ...]:
-    """The members of a class of records, of its bases first."""
+    """Return the members of a class of records, those of its bases first."""
     if is_typeddict(kind):
         hints = get_type_hints(kind, include_extras=True)
         every = [_member(name, hint) for name, hint in hints.items()]
@@ -215,7 +215,7 @@ def members(kind: type) -> tuple[Member, ...]:
 
 
 def _member(attribute: str, hint: Any, doc: str = "") -> Member:
-    """What a hint says of a member."""
+    """Read a member from an annotation."""
     how = OPTIONAL if get_origin(hint) is NotRequired else As()
     if get_origin(hint) is NotRequired:
         (hint,) = get_args(hint)
@@ -232,7 +232,7 @@ def _member(attribute: str, hint: Any, doc: str = "") -> Member:
 
 
 def schema(kind: Any, parts: dict[str, Any]) -> dict[str, Any]:
-    """The JSON schema of a type; the classes that it is made of are added to ``parts``."""
+    """Return the JSON schema of a type; add the classes it contains to ``parts``."""
     if kind is Any:
         return {}
     if kind in SIMPLE:
@@ -258,7 +258,7 @@ def schema(kind: Any, parts: dict[str, Any]) -> dict[str, Any]:
 
 
 def object_schema(kinds: Sequence[Any], parts: dict[str, Any]) -> dict[str, Any]:
-    """The JSON schema of one object with the members of several classes."""
+    """Return the JSON schema of an object with the members of several classes."""
     properties: dict[str, Any] = {}
     required: set[str] = set()
     for kind in kinds:
@@ -276,22 +276,21 @@ def object_schema(kinds: Sequence[Any], parts: dict[str, Any]) -> dict[str, Any]
 
 
 def summary(kind: type) -> str:
-    """What a class says of itself first, before it comes to its fields."""
+    """Return the first clause of a class's docstring, before its fields."""
     return re.split(r"\.(?:\s|$)|[;:,] ``", " ".join((kind.__doc__ or "").split()), maxsplit=1)[0] + "."
 
 
 def answer_type(function: Callable[..., Any]) -> Any:
-    """The class of what a function answers, from its annotation."""
+    """Return the class of a function's result, from its annotation."""
     return vars(sys.modules[function.__module__])[function.__annotations__["return"]]
 
 
 def resolve_hints(annotations: Mapping[str, Any], module: str) -> dict[str, Any]:
-    """Some of the annotations of a module's class or function, as types with what annotates them; the others may name
-    what is imported for type checkers alone."""
+    """Resolve annotations of a module's class or function; others may name imports for type checkers alone."""
     return get_type_hints(SimpleNamespace(__annotations__=annotations), vars(sys.modules[module]), include_extras=True)
 
 
 def recorded_type(kind: Any) -> Any:
-    """The class whose members are told of another: itself, or what its own ``to_dict`` says that it gives."""
+    """Return the class whose members are recorded: the class itself, or the return type of its own ``to_dict``."""
     own = getattr(kind, "to_dict", Record.to_dict)
     return kind if own is Record.to_dict else get_type_hints(own)["return"]

@@ -1,4 +1,4 @@
-"""What every question is answered with: one line at a prompt, the command line's text in print and in a notebook."""
+"""Base classes of results: one line at a prompt, the text of the command line in ``print`` and notebooks."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from .errors import shorten_text
 from .records import Record, answer_type
 
 LONGEST_LINE, LONGEST_PART = 160, 48
-"""Characters of a value at a prompt, and of each of its fields there."""
+"""Largest length of a value at a prompt, and of each of its fields (characters)."""
 P = ParamSpec("P")
 R = TypeVar("R")
 V = TypeVar("V", bound="Value")
 LISTED = 3
-"""Members of a tuple that are shown; of more their number is."""
+"""Largest number of tuple members that are shown; of longer tuples only the number."""
 
 
 def finite(value: float | None) -> float | None:
-    """A number of a record: null where there is none, or it is infinite."""
+    """Return a number for JSON: None if it is undefined or infinite."""
     return None if value is None or not isfinite(value) else float(value)
 
 
 class Value(Record):
-    """A frozen dataclass (with ``repr=False``) that is one line at a prompt, and is pickled and copied by its fields:
-    what was computed from them is computed again where it is asked for, and arrays stay read-only."""
+    """Base of frozen dataclasses (with ``repr=False``): one line at a prompt, pickled and copied by fields. Cached
+    properties are computed again in a copy, and arrays stay read-only."""
 
     def __repr__(self) -> str:
         own = [field for field in fields(self) if field.repr]  # type: ignore[arg-type]
@@ -48,7 +48,7 @@ class Value(Record):
 
 
 def brief(value: Any) -> str:
-    """A value in a few characters: of arrays the shape, of long tuples the number of members."""
+    """Return a value in a few characters: of arrays the shape, of long tuples the number of members."""
     if isinstance(value, Mapping | tuple | list) and len(value) > LISTED:
         first = next(iter(value.values() if isinstance(value, Mapping) else value))
         return f"<{len(value)} × {type(first).__name__}>"
@@ -58,7 +58,7 @@ def brief(value: Any) -> str:
 
 
 def content(value: Any) -> Any:
-    """What a value holds, to be compared and hashed: arrays as tuples, of dataclasses the fields that are compared."""
+    """Return the content of a value for comparison and hashing: arrays as tuples, dataclasses as compared fields."""
     if isinstance(value, Mapping):
         return tuple((key, content(each)) for key, each in value.items())
     if isinstance(value, tuple | list):
@@ -69,16 +69,16 @@ def content(value: Any) -> Any:
 
 
 class Compared(Value):
-    """A value (a dataclass with ``eq=False``) that is equal to those that say the same, and where it is a verdict to
-    its word: ``found.verdict == "controllable"``."""
+    """Value (dataclass with ``eq=False``) that compares by content; a verdict also equals its label:
+    ``found.verdict == "controllable"``."""
 
     @property
     def word(self) -> str | None:
-        """A verdict's one word, None for what is no verdict."""
+        """Label of a verdict, None for other values."""
         return getattr(self, "verdict", None) if isinstance(getattr(self, "verdict", None), str) else None
 
     def said(self) -> Any:
-        """What is compared."""
+        """Return the content that is compared."""
         return content(self)
 
     def __eq__(self, other: object) -> bool:
@@ -93,13 +93,13 @@ class Compared(Value):
 
 
 class Result(Compared):
-    """An answer: its ``repr`` is one line, its ``str`` the text of the command line; a notebook shows the same as HTML.
+    """Result of an analysis.
 
-    Two are equal if they say the same about the same robot.
+    ``repr`` is one line, ``str`` the text of the command line, and a notebook shows the same as HTML. Two results are
+    equal if their robots and their JSON are equal.
 
-    ``shown_as`` names its outputs in the table of ``present/outputs.py``. What shows them is in a layer above all
-    questions: the package sets ``public``, which gives its public functions ``text`` and ``html`` and loads them when
-    something is shown.
+    ``shown_as`` names the outputs in the table of ``present/outputs.py``. The functions that show them are in a higher
+    layer: the package sets ``public``, which loads its public functions ``text`` and ``html`` at first use.
     """
 
     shown_as: ClassVar[str]
@@ -111,31 +111,31 @@ class Result(Compared):
             cls.shown_as = shown_as
 
     def headline(self) -> str:
-        """What is said in one line."""
+        """Return the result in one line."""
         raise NotImplementedError
 
     def text(self) -> str:
-        """What the command prints, where ``present/outputs.py`` does not say it."""
+        """Return the text of the command, unless ``present/outputs.py`` defines it."""
         return self.headline()
 
     def plot(self, axes: Any) -> None:
-        """Draw the answer on the axes of a figure, where ``present/outputs.py`` does not say how."""
+        """Draw the result on axes, unless ``present/outputs.py`` defines the figure."""
 
     def rows(self) -> Iterable[Iterable[Any]]:
-        """The answer's rows, their heads first, where ``present/outputs.py`` does not say how."""
+        """Return the rows of the result, headings first, unless ``present/outputs.py`` defines them."""
         return ()
 
     @staticmethod
     def answer_of(name: str) -> type[Result]:
-        """The class of a public function's answers."""
+        """Return the class of a public function's results."""
         found: type[Result] = answer_type(Result.public(name))
         return found
 
     def require_answered(self, **asked: Any) -> None:
-        """Raise what ends the command with another status, where not all that was ``asked`` has an answer."""
+        """Raise the error of the command's exit status if a part of the request has no result."""
 
     def said(self) -> tuple[Any, ...]:
-        """What is compared: the robot with what is watched of it, and the record."""
+        """Return the content that is compared: the setup and the JSON."""
         return getattr(self, "setting", None), self.to_dict()
 
     def __hash__(self) -> int:
@@ -152,7 +152,7 @@ class Result(Compared):
 
 
 def require_keywords(function: Callable[..., Any], given: Iterable[str], more: Iterable[str] = ()) -> None:
-    """Raise ``TypeError`` for an unknown keyword, with the nearest known one; ``more`` are those behind its ``**``."""
+    """Raise ``TypeError`` for an unknown keyword, with the nearest known one; ``more``: keywords of its ``**``."""
     known = [name for name, each in signature(function).parameters.items() if each.kind is not Parameter.VAR_KEYWORD]
     known += more
     for name in given:
@@ -165,7 +165,7 @@ def require_keywords(function: Callable[..., Any], given: Iterable[str], more: I
 
 
 def with_spelling(function: Callable[P, R]) -> Callable[P, R]:
-    """A function that tells of a wrong keyword which ones it has."""
+    """Decorate a function to name its keywords when an unknown one is given."""
 
     @wraps(function)
     def called(*args: P.args, **given: P.kwargs) -> R:
@@ -176,7 +176,7 @@ def with_spelling(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def with_value(function: Callable[[V], R]) -> Callable[[V], R]:
-    """A function of one frozen value, whose answer is kept with that value."""
+    """Decorate a function of one frozen value to cache its result in that value."""
     name = f"_{function.__name__}"
 
     @wraps(function)
@@ -190,8 +190,8 @@ def with_value(function: Callable[[V], R]) -> Callable[[V], R]:
 
 
 def by_name(value: type[Any], keyword: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """A question whose options are one frozen value, its ``keyword``, and that takes that value's fields by their own
-    names as well."""
+    """Decorate an analysis with options in one frozen value (``keyword``) to accept the fields of that value as
+    keywords."""
     fields = signature(value).parameters
 
     def named(question: Callable[..., Any]) -> Callable[..., Any]:

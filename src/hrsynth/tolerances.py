@@ -1,4 +1,4 @@
-"""Every tolerance of the project, each with its meaning.
+"""Tolerances of comparisons, each with its meaning.
 
 Lengths are made comparable with angles by a robot's *characteristic length* (the mean distance of its joint centres
 from their centroid): a length divided by it is a pure number, as an angle is.
@@ -9,92 +9,81 @@ from their centroid): a length divided by it is a pure number, as an angle is.
 ASSEMBLED = 1e-12
 """Residual (characteristic lengths, radians) below which a shipped or written file counts as assembled at zero."""
 SOLVED = 1e-12
-"""Residual (characteristic lengths, radians) at which the solver of closed configurations is content."""
+"""Closure residual (characteristic lengths, radians) at which the loop solver stops."""
 STANDING = 1e-5
-"""Relative decrease of a sum of squares below which least squares far from a zero are given up; near a zero each step
-takes away nearly all of it."""
+"""Relative decrease of a sum of squares below which least squares far from a zero stop."""
 SHARP = 1e-15
-"""Residual that is asked for where a singular pose is wanted as exactly as numbers allow."""
+"""Closure residual of singular poses that are needed to full precision."""
 CLOSED = 1e-10
 """Residual (characteristic lengths, radians) below which a configuration counts as closed."""
 MOTION_STEP = 0.1
 """Longest step (nv,) along a self-motion (characteristic lengths, radians)."""
 MOTION_NEAR = 0.01
-"""Length of random steps that are closed again to count the ways in which a robot can move: what bends the set of
-closings is small there beside it."""
+"""Length of random steps, closed again, that count the finite mobility; the closed set bends little over it."""
 MOTION_BEND = 0.3
-"""How long the correction of such a step may be, as part of it, and by how much the cosine of the angle between one
-tangent and the next may fall short of one: a step that returns to where it began is no motion."""
+"""Largest correction of such a step as a fraction of it, and largest 1 - cosine between successive tangents."""
 MOTION_FREE = 1e-3
-"""Singular values of loops and measurements, as part of the largest, below which a self-motion is looked for: whether
-there is one is decided by following it."""
+"""Relative singular value of loops and measurements below which a self-motion is searched; following it decides."""
 MOTION_LEAST = 0.2
-"""Distance (characteristic lengths and radians together) over which a self-motion must stay closed to count as one."""
+"""Distance (characteristic lengths and radians) over which a self-motion must stay closed."""
 PASSED_BY = 1e-3
-"""Residual at which a configuration on the way to another is near enough to go on from."""
+"""Closure residual at which a waypoint counts as passed."""
 AS_PRINTED = 1e-5
-"""Difference (metres, radians; characteristic lengths) at which a part of a pose that never changes, or a pose of more
-parts than there are freedoms, is taken as its printed value."""
+"""Difference (metres, radians; characteristic lengths) up to which a coordinate equals its printed value."""
 HALF_TURN = 5e-7
-"""Angle (radians) from −π within which half a turn is printed as π: that of the digits that are printed."""
+"""Angle (radians) from -pi within which a rotation is printed as pi."""
 NEAREST = 1e-10
 """Projected gradient (characteristic lengths, radians) at which a pose counts as the nearest one."""
 FOLLOWED = 1e-9
-"""Residual below which a hidden robot has reached the pose and the directions of the real one."""
+"""Residual at which a hidden robot has the pose and directions of the real one."""
 NO_NEARER = 1e-9
-"""Part of what a leg misses a goal by that some steps must win for it to be led on."""
+"""Smallest relative progress of a leg toward a goal over some steps; below it the leg stops."""
 STEADY_TANGENT = 1e-10
 """Turn (radians) of the tangent space that the residual of a sample may cause."""
 EASY_RANK = 1e-3
-"""Singular values below this part of the largest are no directions to go in where the straight way to a goal cannot
-be gone."""
+"""Relative singular value below which a direction is not used to bypass a blocked straight path."""
 NEAR_FOLD = 1e-5
-"""Singular values of loops and goal below which a fold is looked for."""
+"""Relative singular value of loops and goal below which a fold is searched."""
 NO_SLIDER = 1e-3
-"""Part of its span below which the way of a slider of the view counts as none."""
+"""Fraction of its span below which the travel of a slider of the view counts as zero."""
 OUT_OF_REACH = 1e-7
-"""Radius (part of the extents) of the balls around a pose within which no leg's closure is refused: a leg that is
-nearer to its reach than that stays undecided."""
+"""Radius (fraction of the extents) of balls around a pose within which no leg is proved out of reach."""
 
 LINE_AT_CENTRE = 1e-3
-"""Distance (m) up to which an observed line counts as one through the camera's centre: its chain has other motors."""
+"""Distance (m) up to which an observed line counts as passing through the camera centre."""
 
 # Ranks and relations
 
 RANK_GAP = 1e3
 """Smallest ratio of the last kept to the first dropped singular value at which a rank is a verdict."""
 RANK_CUTOFF = 1e-7
-"""Singular values below this fraction of the largest are candidates for zero; the gap around it is what decides."""
+"""Relative singular values below this are candidates for zero; the gap around it decides."""
 LOOPS_SCALE = 1e-5
-"""What the largest singular value of the loops' Jacobian (characteristic lengths, radians) counts as at least: loops
-that hold nothing back, such as a ball where two axes meet, leave rounding alone, which is no rank."""
+"""Smallest scale of the loop Jacobian's singular values (characteristic lengths, radians)."""
 NO_SPREAD = 1e-12
-"""Mean distance of joint centres from their centroid, as part of their largest coordinate, that is rounding: they are
-one point."""
+"""Relative mean distance of joint centres from their centroid below which they are one point."""
 SAME_RELATION = 1e-6
-"""Largest principal angle (radians) at which two relations count as the same."""
+"""Largest principal angle (radians) at which two velocity relations are equal."""
 UNMOVING = 1e-6
-"""Length of (t, u̇), as part of what is wished, below which a mechanism cannot go that way."""
+"""Relative length of (t, u̇) below which a mechanism cannot move in a direction."""
 SURELY_SOMETHING = 1e-5
-"""Singular values of a relation above this count, whatever rounding did."""
+"""Singular values of a velocity relation above this are nonzero despite rounding."""
 SURELY_ZERO = 1e-9
-"""Singular values of a relation below this are zero, whatever rounding did; between the two lies the cutoff."""
+"""Singular values of a velocity relation below this are zero; the cutoff lies between the two."""
 INVERTED = 1e-9
-"""Singular values below this fraction of the largest are left out where a map is inverted on its range."""
+"""Relative singular value below which a map is not inverted."""
 BOUNDED = 1e-3
-"""Part of a limit that a bound leaves for rounding, where it takes the place of singular values."""
+"""Fraction of a limit that a bound reserves for rounding."""
 CONTINUED = 0.5
-"""Part of a small step along what the loops allow to first order that is left where they are closed again: below, it
-led nowhere."""
+"""Fraction of a small first-order step that must remain after closing; less is no finite motion."""
 CONTINUED_STEP = 0.01
-"""Length of such a step (characteristic lengths, radians): all but a hundredth is left on a smooth branch."""
+"""Length of such a step (characteristic lengths, radians)."""
 NUDGE = 1e-6
-"""Step (characteristic lengths, radians) over which a slope is taken."""
+"""Step (characteristic lengths, radians) of difference quotients."""
 NAMED = 1e-6
-"""Difference (metres, pure numbers) up to which a freedom is the one that a direction or a line of the robot names."""
+"""Difference (metres, pure numbers) up to which a twist has the direction or line named in the robot."""
 LOOPS_LOST = 1e-3
-"""Part of its value at the start to which the loops' weakest singular value has fallen where a servo run cannot go
-on."""
+"""Fraction of its initial value at which the loops' smallest singular value stops a servo run."""
 
 # Points, directions, mechanisms
 
@@ -112,353 +101,325 @@ TURNING_ARM = 1e-3
 # Files
 
 NOISE = 1e-4
-"""Deviation (characteristic lengths, radians) up to which a relation in a foreign file (axes parallel or perpendicular,
-points that coincide, equal rods) counts as meant and is made exact: CAD stays below, whatever the digits."""
+"""Deviation (characteristic lengths, radians) up to which special geometry of a foreign file is snapped."""
 MAY_MEET = 2e-2
-"""Distance (characteristic lengths) up to which two frames of a foreign file are told as ones that a closure may hold
-together."""
+"""Distance (characteristic lengths) up to which two frames of a foreign file are candidates for a closure."""
 SINGLE = 1e-6
-"""Difference (relative, of numbers above one) up to which a number of single precision is one of double precision that
-stands beside it, and shapes are stretched alike."""
+"""Relative difference up to which a number of single precision equals one of double precision."""
 LARGEST_NOISE = 0.1
-"""Largest deviation up to which a user can have such relations made exact."""
+"""Largest tolerance that a user can give for snapping."""
 ROUNDED = 2.5
-"""Deviation of such a relation, as a multiple of the last decimal (a length of it, an angle of it) that a file's
-numbers have: the half decimals of the frames on the way from joint to joint, with their levers."""
+"""Deviation of special geometry in units of the last decimal of a file's numbers."""
 NO_FINER = 3.0
-"""Factor around the tolerance for such relations within which none may lie that would change what the robot is."""
+"""Factor around the tolerance within which no other structure of the robot may exist."""
 EXACT = 1e-11
-"""Deviation (characteristic lengths, radians) below which such a relation holds as well as numbers allow."""
+"""Deviation (characteristic lengths, radians) below which geometry is exact to rounding."""
 NEARLY_ONE = 2e-3
-"""By how much a rounded unit vector can miss its length, or an angle (rad) a simple one, to show that it is rounded."""
+"""Largest deviation of a rounded unit vector's length, or of an angle (rad) from a simple one."""
 OBLIQUE = 0.1
-"""Sine of the angle between two axes below which where they meet is not looked at."""
+"""Sine of the angle between two axes below which their intersection is not computed."""
 FAINT = 1e-3
-"""Singular value of a file's loops, as part of the largest, below which a direction is held by rounding alone."""
+"""Relative singular value of a file's loops below which only rounding constrains a direction."""
 LIMIT_MARGIN = 0.1
-"""How far within its limits (radians, characteristic lengths) a joint is put where a file's loops close beyond them."""
+"""Distance (radians, characteristic lengths) inside its limits at which a joint starts when loops close beyond them."""
 NEARLY_SINGULAR = 5e-3
-"""Weakest singular value, as part of the largest, below which a foreign file's zero pose is left for a firmer one."""
+"""Relative smallest singular value below which a foreign file's zero configuration is replaced."""
 NEWTON_REACH = 1e4
-"""Length of a Newton step in a foreign file's loops, as a multiple of the residual that it removes, beyond which it
-follows rounded numbers."""
+"""Length of a Newton step in a foreign file's loops, per residual, beyond which it follows rounding."""
 COMMAND_STEP = 1e-7
-"""Step (characteristic lengths, radians) of differences of what a servo law commands."""
+"""Step (characteristic lengths, radians) of differences of servo commands."""
 COMMAND_CUTOFF = 1e-10
-"""Singular value, as part of the largest, below which such differences show no rate."""
+"""Relative singular value below which such differences show no rate."""
 AT_ORIGIN = 1e-12
 """Distance (m) below which a joint's centre is the origin of the link that it carries, where a file is written."""
 WITHOUT_DIRECTION = 1e-9
 """Length up to which a vector in a file has no direction."""
 LIKE_A_WORD = 0.65
-"""Part of two words that agrees (matching letters) from which an unknown one in a file counts as a slip of
-the other."""
+"""Similarity from which an unknown name in a file counts as a misspelling."""
 OPPOSITE = 1e-3
-"""One plus the cosine of the angle between two axes of a closure below which they point opposite ways."""
+"""One plus the cosine between two axes of a closure below which they are opposite."""
 SAME_ROBOT = 1e-5
-"""Difference (characteristic lengths, radians; of masses, as part of them) up to which two files say the same of a
-robot: what five printed digits leave."""
+"""Relative difference (characteristic lengths, radians, masses) up to which two files describe one robot."""
 NO_BODY = 1e-6
-"""Part of an inertia's largest entry by which a second moment may be negative: printed digits of a flat body's."""
+"""Relative negative second moment that an inertia may have: printed digits of a flat link."""
 IN_DEGREES = 5.0
 """Angles in a file that are whole multiples of it (degrees) and larger than a turn in radians are taken for degrees."""
 UNIT_AXIS = 1e-3
-"""By how much the length of an axis in a file may differ from one before that is told: printed digits do."""
+"""Deviation of an axis length from one in a file that is reported."""
 TURN_IN_RADIANS = 6.3
 """Radians above which an angle in a file is more than a turn."""
 
 # Singularities
 
 SAME_SPOT = 1e-6
-"""Distance (metres; of poses, of their matrices) below which two singular poses are told once."""
+"""Distance (metres; of poses, of their matrices) below which two singular poses are one."""
 ON_PLANE = 10**-4.5
-"""Error (characteristic lengths, radians) up to which a singular pose that was sought near a plane of poses counts as
-lying in it."""
+"""Deviation (characteristic lengths, radians) up to which a singular pose lies in a plane of poses."""
 LOCUS = 1e-7
 """Singular value, relative to the spread of a locus, below which the locus has no extent in that direction."""
 VALLEY_DEPTH = 0.5
-"""Part of the median below which a valley of the smallest singular value is looked into."""
+"""Fraction of the median below which a valley of the smallest singular value is searched."""
 VALLEY_ZERO = 1e-5
 """Part of the median at which the smallest singular value in a valley counts as zero."""
 COMPLEX_STEP = 1e-20
-"""Imaginary step over which the slope of a polynomial is taken: nothing cancels, so that it is exact."""
+"""Imaginary step of the slope of a polynomial, exact because nothing cancels."""
 
 # Assembly modes
 
 PARALLEL = 1e-13
-"""Sine of the angle below which two directions of given curves are taken for exactly parallel, as an angle rounded from
-one that is: it decides how many solutions lie at infinity."""
+"""Sine of the angle below which two directions of loci are exactly parallel: it decides the solutions at infinity."""
 SAME_SENSE = 1e-3
-"""Difference of measured values (unit vectors; lengths in characteristic lengths) up to which a mode has the value that
-is held, and not the opposite one."""
+"""Difference of measured values (unit vectors; characteristic lengths) up to which a mode has the desired value."""
 VANISHES = 1e-9
-"""Distance of a tip from its curve (sizes of the mechanism) at which a pose matches one observation too many."""
+"""Distance of an attachment point from its locus (characteristic lengths) at which a pose fits redundant legs."""
 NEAR_MODE = 1e-2
-"""Distance of tips from their curves (sizes of the mechanism) up to which a pose that matches almost is reported."""
+"""Distance of attachment points from their loci (characteristic lengths) up to which a near match is reported."""
 NO_NEAR_MODE = 0.3
-"""Misses (sizes of the mechanism) beyond which a start leads to no near mode."""
+"""Distance (characteristic lengths) beyond which a start leads to no near mode."""
 SAME_NEAR_MODE = 1e-6
-"""Difference of poses and of misses (sizes of the mechanism) below which two stationary poses are one."""
+"""Difference of poses and distances (characteristic lengths) below which two stationary poses are one."""
 MEASUREMENT_BOUND = "0.1deg"
-"""Error of a measurement up to which poses are not told apart, where nothing is said."""
+"""Default measurement bound, within which poses are indistinguishable."""
 SAME_NEAR_POSE = 1e-4
-"""Difference of poses (characteristic lengths, entries of turns) below which two minima of a difference of measured
-values are one."""
+"""Difference of poses (characteristic lengths, entries of rotations) below which two minima are one."""
 FAMILY_STEP = 0.02
-"""Step (characteristic lengths, radians) along a freedom that values leave at a near mode, over which they are to stay
-within the bound if it is one of a continuous family."""
+"""Step (characteristic lengths, radians) over which values of a near mode must stay within the bound in a family."""
 CURVATURE_STEP = 1e-4
-"""Step (characteristic lengths, radians) of the differences of the slope of such a difference."""
+"""Step (characteristic lengths, radians) of the differences of such a slope."""
 MEANT = 1e-5
-"""Distance (sizes of the mechanism) up to which joint centres count as meant to coincide, where the next larger one is
-``RANK_GAP`` times as large at least."""
+"""Distance (characteristic lengths) up to which joint centres are snapped, if the next one is ``RANK_GAP`` larger."""
 FARTHEST = 1e7
-"""Distance (sizes of the mechanism) beyond which a solution is at infinity but for rounding, where the next nearer one
-is ``RANK_GAP`` times as near at least."""
+"""Distance (characteristic lengths) beyond which a solution is at infinity, if the next one is ``RANK_GAP`` nearer."""
 INDEPENDENT_PLANES = 1e-3
-"""Least sine between a plane's normal and the span of others that give the position of the platform with it."""
+"""Least sine between a plane's normal and the span of the other normals that determine the position."""
 INDEPENDENT_RATES = 1e-6
-"""Least singular value of the rates of conditions, of length one each, that count as independent at the goal."""
+"""Least singular value of the unit rates of independent conditions at the goal."""
 RANK_OF_FORMS = 1e-11
-"""Pivots, of the largest, that count in the rank of a matrix of multiples of conditions."""
+"""Relative pivot that counts in the rank of a matrix of multiples of conditions."""
 NUMBER_ROUNDING = 2.0**-48
-"""How far the numbers of conditions are from the exact ones, of their size: some ten roundings."""
+"""Relative error of the numbers of conditions: some ten roundings."""
 NEARLY_REAL_POSE = 1e-9
-"""Imaginary parts of a proposed pose below which a real one is looked for there."""
+"""Imaginary parts of a proposed pose below which a real one is searched."""
 NO_POSE = 1e-5
-"""|q · q| of a quaternion of length one below which it is that of no pose, to what rounding makes of a double one."""
+"""|q · q| of a unit quaternion below which it is extraneous."""
 NEARLY_DOUBLE = 1e-6
 """Distance between two solutions, in their parameters, below which the pose counts as singular."""
 CHAIN_ROUNDING = 16 * 2.0**-52
-"""What thirty-two roundings, those of a chain of joints from the file's decimals on, make of lengths and angles."""
+"""Relative error of lengths and angles after thirty-two roundings, along a chain of joints."""
 MOVED = 4.0
-"""What an axis that is moved does to points within the robot's extent, at most, as a multiple: a turn carries it to
-both sides, and a tilted one has a lever."""
+"""Largest displacement of points within the robot's extent by a moved axis, as a multiple."""
 TIP_ROUNDING = 2.0**-46
-"""What sixty-four roundings make of a length, relative to the size: poses and tips computed in floats."""
+"""Relative error of a length after sixty-four roundings."""
 SHARP_ROOT = 2.0**-60
-"""Radius of a ball, relative to 1 plus its middle, above which a solution is sought with more digits."""
+"""Relative radius of a ball above which a solution is computed with more digits."""
 NO_POSE_START = 1e-6
-"""How well a start that is no pose satisfies the equations, and how far two of them are apart (each of size one)."""
+"""Residual of extraneous starts, and distance between two of them (both relative)."""
 BOXES_APART = 1e-12
-"""What is added to boxes around solutions, relative to their places and radii, before they count as apart."""
+"""Relative margin by which boxes of solutions must be disjoint."""
 POLISHED = 1e-9
-"""Newton's step (unit vectors) at which the end of a path counts as sharp."""
+"""Newton step (unit vectors) at which a path endpoint is accurate."""
 SAME_END = 1e-8
-"""Distance (unit vectors) below which two ends of paths are one, and one is real."""
+"""Distance (unit vectors) below which two path endpoints are one, and one is real."""
 SAME_SINGULAR_END = 1e-4
-"""Distance (unit vectors) below which two singular ends of paths are one."""
+"""Distance (unit vectors) below which two singular endpoints are one."""
 SINGULAR_END = 1e-5
-"""Smallest singular value, of quadrics with coefficients of one size, below which an end counts as singular; a tenth of
-it, as part of the largest, is left out on the way there."""
+"""Smallest singular value of scaled quadrics below which an endpoint is singular; a tenth is the cutoff on the path."""
 BALL_ZERO = 2.0**-256
-"""Radius of a ball that holds zero at which the number in it counts as zero."""
+"""Radius of a ball containing zero at which its number is zero."""
 
 UNIT_ROUNDOFF = 2.0**-53
-"""What one rounding makes of a number, relative to its size."""
+"""Relative error of one rounding."""
 SINE_ERROR = 2.0**-50
-"""Error of a sine or cosine in a program that was generated, at most: four units in the last place."""
+"""Largest error of a sine or cosine in generated code: four units in the last place."""
 AFFINE_ROUNDING = 2.0**-46
-"""What sixty-four roundings make of numbers, relative to their size: more than one operation on affine forms has."""
+"""Relative error of sixty-four roundings: more than one operation on affine forms has."""
 TOGGLE = 0.03
-"""Weakest singular value of the loops, as part of that at zero, below which a way along a branch ends at a toggle."""
+"""Fraction of its value at zero at which the loops' smallest singular value ends a path at a toggle."""
 TOGGLE_JOINT = 0.05
-"""Part of the largest rate at a toggle from which a joint is one of those that move."""
+"""Fraction of the largest rate at a toggle from which a joint counts as moving."""
 THINNEST_TUBE = 1e-13
-"""Radius of a tube about a branch (characteristic lengths, radians) below which none is tried: rounding decides."""
+"""Smallest radius of a tube around a branch (characteristic lengths, radians)."""
 THINNEST_CELL = 1e-11
-"""The same over a cell: closures at its faces are enclosed to some THINNEST_TUBE, and must fit into it."""
+"""Smallest radius of a tube over a cell (characteristic lengths, radians)."""
 
 # Accuracy
 
 NARROWEST_CONE = 1e-15
-"""Half-angle (rad) of a cone below which directions, as numbers, are no longer told apart."""
+"""Half-angle (rad) of a cone below which directions are equal as numbers."""
 USUAL_ERROR = 100.0
-"""Multiple of the median error of a field up to which a pose serves for a check by longer numbers: nearer to
-singularities rounding grows."""
+"""Multiple of the median error of a field up to which a pose is checked with longer numbers."""
 CONES_MET = 1e-14
-"""Gap between the bounds, relative, at which a maximum of two cones is found."""
+"""Relative gap between the bounds at which a maximum over two cones is found."""
 CONES_TIGHT = 1e-10
-"""Gap between the bounds of three cones and more, relative, at which the maximum counts as found."""
+"""Relative gap between the bounds at which a maximum over three or more cones is found."""
 FLAT_CONE = 1e-20
-"""Part of a cone's largest squared error below which its term has no derivative worth the name."""
+"""Fraction of a cone's largest squared error below which its term has no derivative."""
 HESSIAN_STEP = 1e-4
-"""Step of the differences of the Hessian of a best fit, whose own error is its square."""
+"""Step of the differences of a best fit's Hessian."""
 HESSIAN_CHANGE = 0.5
-"""How far the Hessian of a best fit may change over a step, relative to itself: evenly changed, it is definite all
-along below 1."""
+"""Largest relative change of a best fit's Hessian over a step; below 1 it stays definite."""
 FLAT_CURVATURE = 0.05
-"""Curvature, as part of that at the start, below which a best fit that cannot be followed further is called flat."""
+"""Fraction of the initial curvature below which a best fit that cannot be continued is flat."""
 
 # The loop
 
 DAMPED = 1e-3
-"""Singular values of the rows that a controller inverts (characteristic lengths, radians) below which it damps them."""
+"""Singular values of the inverted rows (characteristic lengths, radians) below which the controller damps them."""
 SERVED = 1e-10
-"""Norm of the error at which a servo loop has ended."""
+"""Norm of the error at which a servo run has reached its goal."""
 NEAREST_SEEN = 1e-3
-"""Depth (m) from which on lines are drawn in a picture."""
+"""Smallest depth (m) of lines drawn in an image."""
 SEEN_ABOVE = 1e-3
-"""Sine of the angle to the focal plane, or to a side of the picture, below which a camera has lost what it sees."""
+"""Sine of the angle to the focal plane, or to a side of the image, below which an object is out of view."""
 NOISE_STEP = 1e-5
-"""Noise (radians, metres, parts of the focal length) by which its first-order effect is found by differences."""
+"""Noise (radians, metres, fractions of the focal length) of the differences of its first-order effect."""
 AT_REST = 1e-8
-"""Speed (characteristic lengths, radians) for each unit of error and gain below which a servo loop is at a local
-minimum."""
+"""Speed (characteristic lengths, radians) per error and gain below which a servo loop is at an equilibrium."""
 RESTED = 1e-10
-"""Newton step (characteristic lengths, radians) at which the rest of a servo loop is found."""
+"""Newton step (characteristic lengths, radians) at which an equilibrium is found."""
 ARRIVED = 1e-6
-"""Distance (characteristic lengths, radians) from a stable rest at which a servo loop has ended there."""
+"""Distance (characteristic lengths, radians) from a stable equilibrium at which a servo run has reached it."""
 REST_SLOPE = 1e-4
-"""Step of the differences of ẏ about a rest: less than the width over which the law is damped."""
+"""Step of the differences of ẏ at an equilibrium: less than the width over which the law is damped."""
 NEAR_REST = 0.1
-"""Longest Newton step (characteristic lengths, radians) to a rest: beyond it no rest is near."""
+"""Longest Newton step (characteristic lengths, radians) to an equilibrium."""
 NEUTRAL_GROWTH = 1e-6
-"""Growth (per time constant) up to which a motion about a rest counts as none; speed up to which a drift does."""
+"""Growth (per time constant) up to which a motion at an equilibrium is neutral; largest speed of no drift."""
 INTEGRATED = 1e-6
-"""Relative tolerance of the integrator of a servo run, for coordinates of a chart as for errors at the start of a
-stretch."""
+"""Relative tolerance of the integrator of a servo run."""
 STRETCH_END = 1e-2
-"""Part of its first error at which a stretch of a servo run ends, so that the tolerance follows the error."""
+"""Fraction of its initial error at which a segment of a servo run ends, so that the tolerance follows the error."""
 RUN_SHORTEST_STEP = 1e-9
-"""Longest step (time constants) with which a servo run that cannot go on has been tried."""
+"""Shortest step (time constants) that a blocked servo run tries."""
 CRITICAL = 1e-11
-"""Gradient of the error along the loops, and loops' residual, at which a critical point is found."""
+"""Gradient of the error along the loops, and closure residual, at a critical point."""
 DEPENDENT = 1e-13
-"""Squares of singular values of the loops' equations, beside their sum, that do not count in a step that closes them.
-"""
+"""Relative squared singular value of the loop equations that a closing step ignores."""
 CLOSURES_MEET = 1e-6
-"""Singular value of the loops' equations, beside the largest, at which a motion more is free: closures meet there, and
-E is critical if it is so along this motion as well, to this slope."""
+"""Relative singular value of the loop equations below which closures meet; largest slope of E along that motion."""
 ERROR_ROUNDING = 1e-14
 """½ ‖e‖² below which it is rounding."""
 SAME_PRICE = 1e-9
-"""Relative difference below which two sums of prices are one."""
+"""Relative difference below which two costs are equal."""
 SAME_ENDING = 1e-5
-"""Difference (characteristic lengths, components of unit vectors) below which two critical points are one; curvature
-below which one may not be isolated."""
+"""Difference (characteristic lengths, unit vectors) below which two critical points are one; curvature of one not
+isolated."""
 VANISHED = 1e-8
-"""‖e‖ below which a critical point is one at which the error vanishes; cosine below which two directions are at right
-angles."""
+"""‖e‖ below which it vanishes at a critical point; cosine below which two directions are perpendicular."""
 CRITICAL_FLAT = 1e-7
-"""Curvature of the error below which it counts as none while a critical point is sought."""
+"""Curvature of the error below which it counts as zero in the search of critical points."""
 FLOWED = 3e-5
-"""Error of a step (characteristic lengths, radians) of many runs at once."""
+"""Error of a step (characteristic lengths, radians) of batched runs."""
 RUNS_ALIKE = 1e-5
-"""Difference of poses (characteristic lengths, entries of rotations) and of ‖e‖ up to which runs end alike."""
+"""Difference of poses (characteristic lengths, entries of rotations) and ‖e‖ up to which runs have one end."""
 FLOW_SLOPE = 1e-6
-"""Step of the differences of their velocities and reach margins."""
+"""Step of the differences of velocities and reach margins of batched runs."""
 FLOW_SHORTEST_STEP = 1e-4
-"""Step (time constants) at which a run that comes no farther within reach has come to a stretched leg."""
+"""Step (time constants) at which a run without progress has a leg at the end of its reach."""
 FLOW_STRETCHED = 1e-2
-"""Reach margin, part of that at home, up to which a leg is stretched there."""
+"""Reach margin, as a fraction of that at zero, up to which a leg counts as stretched."""
 FLOW_TURNED = 1e-6
-"""The same of a leg that slides through a fixed point: below it the leg turns over."""
+"""Reach margin of a leg that slides through a fixed point, below which it reverses."""
 FLOW_WEAK = 3.0
-"""Multiple of ``DAMPED`` below which what the joints do to the platform is taken anew at each step."""
+"""Multiple of ``DAMPED`` below which the map from joints to platform is computed at each step."""
 FLOW_ANEW = 1e-2
-"""How far a pose is (characteristic lengths, entries of its matrix) from where that was taken last."""
+"""Change of pose (characteristic lengths, matrix entries) after which that map is computed again."""
 FLOW_WALL = 1e-8
-"""Reach margin, part of that at home, at which a run goes along where a leg is stretched that is not watched."""
+"""Reach margin, as a fraction of that at zero, at which a run slides along the limit of an unobserved leg."""
 FLOW_SERVED = 1e-6
-"""Norm of the error from which Newton's method does the rest."""
+"""Norm of the error below which Newton's method finishes a run."""
 FLOW_NEAR, FLOW_CONTRACTED, FLOW_CLEAR = 0.1, 0.125, 0.1
-"""Error from which on whole steps of Newton's method are tried, to what part the first has to shorten the next, and the
-reach margins, as parts of those at home, that all legs keep."""
+"""Error from which full Newton steps are tried, their contraction, and the reach margins kept (fractions of those at
+zero)."""
 IN_PLANE = 1e-3
-"""Distance (characteristic lengths, radians) up to which an end of runs is drawn in a plane."""
+"""Distance (characteristic lengths, radians) up to which the end of runs is drawn in a plane."""
 BENCH_SETTLED = 1e-6
-"""‖e‖ at which the physics bench has settled."""
+"""‖e‖ at which the dynamic simulation has settled."""
 BENCH_STEADY = 1e-3
-"""Part by which an error may still change in a time constant when the physics bench has settled."""
+"""Relative change of the error per time constant below which the dynamic simulation has settled."""
 
 # The catalog
 
 PROVED_CHANCE = 1e-9
-"""Largest chance of an error of a record of the catalog that is called proved."""
+"""Largest probability of error of a proved catalog entry."""
 SQUARE_AXES = 1e-9
-"""Cosine of the angle between two axes of a U below which they are at right angles, where a catalog's robot is
-built."""
+"""Cosine below which the axes of a U in the catalog are perpendicular."""
 
 # Motors to joints
 
 ROUNDED_AXIS = 1e-15
-"""Component of a unit vector below which it is zero but for rounding."""
+"""Component of a unit vector below which it is zero."""
 GENERATED_NEAR = 1e-7
-"""Step of Newton's method (characteristic lengths, radians) after which a generated program makes its last one: what is
-left is of the size of its square."""
+"""Newton step (characteristic lengths, radians) after which generated code makes its last one."""
 GENERATED_ERROR = 1e-12
-"""What its answers may be off (characteristic lengths, radians), its own rounding included."""
+"""Largest error of results of generated code (characteristic lengths, radians), rounding included."""
 BOUND_WIDER = 1.25
-"""Radius over which its steps are bounded, as part of the tube's."""
+"""Radius over which steps of generated code are bounded, as a multiple of the tube's."""
 BOUND_ROUNDING = 1 + 2.0**-40
-"""What bounds of its steps are multiplied by, for the rounding of their own products."""
+"""Factor on bounds of its steps for the rounding of their own products."""
 FREE_WIDER, FREEST_WIDER = 2.0, 24.0
-"""The same where it is not known that the tube holds a zero of the equations that are solved; if that is not enough, as
-part of its largest radius."""
+"""The same factors if the tube is not known to contain a zero: first choice, and multiple of its largest radius."""
 PART_TUBE = 0.6
-"""Radius of the tubes that are tried in parts of a cell, as part of its own."""
+"""Radius of tubes in parts of a cell, as a fraction of its own."""
 GENERATED_LAST_STEP = 3e-12
-"""Largest last step of an answer (characteristic lengths, radians)."""
+"""Largest last step of generated code (characteristic lengths, radians)."""
 GENERATED_CLOSED = 1e-11
-"""What its loops' equations may be off where it gives an answer (cosines, metres, or characteristic lengths where these
-are more than a metre)."""
+"""Largest closure residual of generated code (cosines; metres, or characteristic lengths above one metre)."""
 GENERATED_REACHED = 1e-12
-"""Difference from a pose at which it has reached it (rad, and lengths as above)."""
+"""Difference from a pose at which generated code has reached it (rad; lengths as above)."""
 GENERATED_SINGULAR = 1e-14
-"""Pivot of the normal equations, as part of the largest of the diagonal, below which it finds rates singular."""
+"""Relative pivot of the normal equations below which generated code reports singular rates."""
 
-# Pictures and views
+# Figures and views
 
 DISTANCE_FLOOR = 1e-3
-"""Part of the largest distance to a singularity on a map below which all share one colour."""
+"""Fraction of the largest singularity distance on a map below which the colour is constant."""
 DARKEST_DISTANCE = 1e-6
-"""Singular value below which all share the darkest grey behind a locus."""
+"""Singular value below which the grey behind a locus is darkest."""
 UNMOVED = 1e-9
-"""Metres, radians below which a platform has not moved along an axis, or not turned, in the picture of a run."""
+"""Motion (metres, radians) below which a platform is drawn as not moving along a coordinate."""
 REST_OF_RUN = 1e-3
-"""Part of the largest error below which the rest of a run is not drawn."""
+"""Fraction of the largest error below which a run is not drawn further."""
 LARGEST_FIRST_ORDER = 1.0
-"""Error of a pose (characteristic lengths, radians) above which what was computed to first order bounds nothing."""
+"""Pose error (characteristic lengths, radians) above which first-order bounds are invalid."""
 ON_LOCUS = 0.2
-"""Smallest singular value of Mᵀ, as part of its median over a plane, below which a change of a determinant's sign there
-is where it vanishes, not where it is infinite."""
+"""Fraction of the median of the smallest singular value of Mᵀ in a plane, below which a sign change of a determinant is
+a zero."""
 SLIDER_ARRIVED = 1e-6
-"""Difference (metres, radians) within which the platform has come to where a slider sent it."""
+"""Difference (metres, radians) at which the platform has reached the value of a slider."""
 NARROWEST_RISING_CONE = 2.0**-7
-"""Half the width of a cone about a goal, in faces of the cube [-1, 1] to the n, below which it is cut no more."""
+"""Smallest half-width of a cone around a goal, in faces of the cube [-1, 1] to the n."""
 SHORTEST_SLICE = 2.0**-9
-"""Length of a slice of such a cone, in square roots of twice the error, below which it is cut no more."""
+"""Smallest length of a slice of such a cone, in square roots of twice the error."""
 CERTIFIED_LEVEL = 0.95
-"""Part of the error at which a ray is seen to stop rising up to which it is tried to prove that all rays rise."""
+"""Fraction of the error at which rays stop rising, up to which the proof tries that all rays rise."""
 RADIUS_SHARES = (0.97, 0.9, 0.8, 0.65, 0.5, 0.3)
-"""Parts of the radius that rays show that are tried, one after the other, as the certified one."""
+"""Fractions of the radius found by rays that are tried in turn as attraction radius."""
 INWARD_SHARES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
-"""The same of a ball into which the law leads."""
+"""Fractions of that radius for a ball into which the flow points."""
 MET_AGAIN = 1e-7
-"""Half the edge (characteristic lengths, radians) of the smallest box in which it is tried to prove one critical point:
-the file's numbers are known to a hundredth of that."""
+"""Smallest half-edge (characteristic lengths, radians) of a box of one critical point."""
 THINNEST_BOX = 1e-3
-"""Least ratio of such a box's edges."""
+"""Smallest ratio of such a box's edges."""
 COVER_REACH = 1.0
-"""Half the width (characteristic lengths) of the box of platform positions that is looked at where legs have none."""
+"""Half-width (characteristic lengths) of the box of platform positions if legs give none."""
 SHORTEST_ROD = 0.05
-"""Length (characteristic lengths) of a rod that slides below which its leg counts as out of reach."""
+"""Length (characteristic lengths) of a sliding rod below which its leg is out of reach."""
 SHORT_SHARE = 0.1
-"""Part of the least distance of two base points up to which boxes about a short rod reach."""
+"""Fraction of the least distance of two base points up to which boxes around a short rod extend."""
 COVER_MARGIN = 1.25
-"""How many times as far as the farthest base point boxes of positions reach, before those of poses far away."""
+"""Extent of the boxes of positions as a multiple of the farthest base point."""
 KNOWN_NUMBER = 1e-12
-"""How far a number of the file may be off, lengths in characteristic lengths, for which boxes prove a list of rests."""
+"""Uncertainty of the file's numbers (lengths in characteristic lengths) in proofs of all equilibria."""
 BOX_ROUNDING = 1e-12
-"""What rounding makes of the edges of a box that equations narrow, relative to them."""
+"""Relative rounding of the edges of a box."""
 SMALLEST_BOX = 1e-8
-"""Part of the whole box below which a box of poses and joints that is not settled is left open."""
+"""Fraction of the whole box below which an undecided box remains undecided."""
 COVER_ROOM = 1e-6
-"""How much farther than linear programs say boxes go, in characteristic lengths: these are solved to 1e-7."""
+"""Margin of linear-program bounds of boxes (characteristic lengths); the programs are solved to 1e-7."""
 SINGULAR_BOX = 1e-4
-"""The same of a box in which the equations of the legs may be dependent."""
+"""Smallest fraction of the whole for a box in which the leg equations may be dependent."""
 SINGULAR_FINER = SINGULAR_BOX / 4, SINGULAR_BOX / 16, SINGULAR_BOX / 64
-"""Parts of the whole to which such boxes are cut, one after the other, where they fill more than one place together."""
+"""Fractions of the whole to which such boxes are subdivided in turn, if they form several clusters."""
 LOCKED_PLACE = 0.01
-"""Longest edge of what such boxes fill together, as part of all, to be told as one place; what is longer is open."""
+"""Longest edge of a cluster of such boxes, as a fraction of the whole, that is reported as one place."""

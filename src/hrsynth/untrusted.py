@@ -1,4 +1,4 @@
-"""Content that is not trusted: what it unpacks to, and what a program makes of it, stays within limits."""
+"""Untrusted content: limits of unpacked size, and of the programs that read it."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from .errors import BadRequest
 
 START = "import sys, json; sys.path[:] = json.loads(sys.argv[1]); from {} import start; start(*sys.argv[2:])"
 REFUSED = "refused: "
-"""What the last line of such a program begins with where it refuses what it reads."""
+"""Start of a line by which such a program refuses its input."""
 
 
 def gunzip(content: bytes, file: object, most: int) -> bytes:
-    """What bytes of gzip unpack to; raises ``BadRequest`` where they are none, cut off, or unpack to too much."""
+    """Unpack gzip; raises ``BadRequest`` for other, truncated or too much content."""
     parts, size = [], 0
     try:
         while content:
@@ -30,17 +30,17 @@ def gunzip(content: bytes, file: object, most: int) -> bytes:
             parts.append(inflate.decompress(content, most - size + 1))
             size += len(parts[-1])
             if size > most:
-                raise BadRequest(f"{file}: unpacks to", f"more than {most} bytes", f"up to {most}")
+                raise BadRequest(f"{file}: unpacks to more than {most} bytes", remedy="Use a smaller file.")
             if not inflate.eof:
                 raise zlib.error
             content = inflate.unused_data.lstrip(b"\0")
     except zlib.error:
-        raise BadRequest(f"{file}: truncated, or not compressed with gzip") from None
+        raise BadRequest(f"{file}: truncated or not gzip", remedy="Copy the file again.") from None
     return b"".join(parts)
 
 
 def packing_defect(content: bytes) -> str | None:
-    """What is wrong with a zip archive by its list of files, before any is unpacked; None for other content."""
+    """Return the defect of a zip archive by its list of files, before unpacking; None for other content."""
     if not content.startswith(b"PK"):
         return None
     try:
@@ -49,9 +49,9 @@ def packing_defect(content: bytes) -> str | None:
         return "a zip archive that cannot be read"
     size = sum(each.file_size for each in files)
     if len(files) > MOST_UNPACKED:
-        return f"an archive of {len(files)} files, allowed: up to {MOST_UNPACKED}"
+        return f"an archive of {len(files)} files, more than {MOST_UNPACKED}"
     if size > LARGEST_UNPACKED:
-        return f"an archive that unpacks to {size} bytes, allowed: up to {LARGEST_UNPACKED}"
+        return f"an archive that unpacks to {size} bytes, more than {LARGEST_UNPACKED}"
     names = [each.filename.replace("\\", "/") for each in files]
     if any(name.startswith("/") or ".." in name.split("/") for name in names):
         return "an archive with names that lead out of it"
@@ -59,14 +59,14 @@ def packing_defect(content: bytes) -> str | None:
 
 
 def refuse(what: str) -> None:
-    """End such a program with what is wrong with what it reads."""
+    """End such a program with the defect of its input."""
     print(REFUSED + " ".join(what.split()), file=sys.stderr, flush=True)
     os._exit(2)
 
 
 def output(program: Path, *arguments: str, seconds: int, given: str = "") -> bytes:
-    """What ``main`` of a program prints, run in a process of its own, of limited time, memory and output, with a text
-    on its standard input; raises ``BadRequest`` with what it refuses, or that it came to no end."""
+    """Return the output of a program's ``main``, run in a process of limited time, memory and output; ``given``: its
+    standard input. Raises ``BadRequest`` if it refuses its input or does not finish."""
     command = [
         sys.executable,
         "-I",
@@ -91,15 +91,16 @@ def output(program: Path, *arguments: str, seconds: int, given: str = "") -> byt
             errors.seek(0)
             lines = errors.read(LARGEST_UNPACKED).decode("utf-8", "replace").splitlines()
     except (subprocess.TimeoutExpired, ValueError):
-        raise BadRequest("it did not finish", None, f"{seconds} seconds") from None
+        raise BadRequest(f"not read within {seconds} s", remedy="Use a smaller file.") from None
     except OSError as error:
-        raise BadRequest(f"cannot write a temporary file: {error.strerror}", tempfile.gettempdir()) from None
+        text = f"{tempfile.gettempdir()}: cannot write a temporary file: {error.strerror}"
+        raise BadRequest(text, remedy="Set TMPDIR to a writable folder.") from None
     last = [line.removeprefix(REFUSED) for line in lines if line.startswith(REFUSED)]
-    raise BadRequest(last[-1][:400] if last else "it needs more memory or time than is allowed, or breaks its reader")
+    raise BadRequest(last[-1][:400] if last else "memory or time limit exceeded, or the reader crashed")
 
 
 def start(program: str, seconds: str, most: str, *arguments: str) -> None:
-    """Run ``main`` of a program within the limits (called in that process)."""
+    """Run ``main`` of a program within the limits; called in that process."""
     import resource
 
     for limit, amount in (
@@ -115,7 +116,7 @@ def start(program: str, seconds: str, most: str, *arguments: str) -> None:
         runpy.run_path(program)["main"](*arguments)
         sys.stdout.flush()
     except (MemoryError, RecursionError):
-        refuse(f"it needs more memory than {PROCESS_BYTES} bytes")
+        refuse(f"reading needs more than {PROCESS_BYTES} bytes of memory")
     except OSError as error:
-        refuse(f"it cannot be read, or unpacks to more than {most} bytes: {error.strerror}")
+        refuse(f"not readable, or unpacks to more than {most} bytes: {error.strerror}")
     os._exit(0)

@@ -1,3 +1,3 @@
-"""The version, by itself so that everything may say it."""
+"""Version, alone in a module that everything can import."""
 
 __version__ = "0.2.0"

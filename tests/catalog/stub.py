@@ -28,7 +28,7 @@ ASKED: dict[str, tuple[Any, ...]] = {
     "dof": (3, 2, 9),
     "motion": ("3T", "2T1R"),
     "verdict": ("partially controllable", "controllable"),
-    "see": ("3point", "3point'"),
+    "sensors": ("3point", "3point'"),
     "group": ("mixed", "planar"),
     "base_motors": (True, False),
     "fewest": (2, 0),
@@ -73,14 +73,14 @@ def entry(word: str) -> dict[str, Any]:
     rank = draw.randint(0, dof)
     verdict = VERDICTS[0 if rank == dof else 2 if rank == 0 else 1]
     return {
-        "word": word,
+        "key": word,
         "notation": f"{legs}-{draw.choice(CHAINS)}",
         "hidden": None if rank == 0 else "2-U*PS",
         "legs": legs,
         "dof": dof,
         "motion": f"{dof}T" if dof < 4 else f"3T{dof - 3}R",
         "mobility": dof,
-        "idle": 0,
+        "internal": 0,
         "verdict": verdict,
         "rank": rank,
         "exact": True,
@@ -89,7 +89,7 @@ def entry(word: str) -> dict[str, Any]:
         "motors": legs,
         "fewest": min(rank, legs),
         "minimal": [["1"]],
-        "lost": ["rotation"] if rank < dof else [],
+        "unobserved": ["rotation"] if rank < dof else [],
         "condition": "the lines σ meet",
         "modes_bound": 2 * rank or None,
         "modes_seen": rank or None,
@@ -111,7 +111,7 @@ def died(word: str) -> dict[str, Any]:
 
 def broken(word: str) -> dict[str, Any]:
     """A defect."""
-    return entry(word) if word != "(c05)" else {"word": word, "dof": [][0]}
+    return entry(word) if word != "(c05)" else {"key": word, "dof": [][0]}
 
 
 def slowly(word: str) -> dict[str, Any]:

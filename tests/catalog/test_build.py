@@ -81,9 +81,9 @@ def test_a_group_is_one_file_sorted_compact_and_ascii(whole: dict[str, bytes]):
     for group, data in zip("cd", whole.values(), strict=True):
         head, *lines = data.decode("ascii").splitlines()
         crc = zlib.crc32(data.partition(b"\n")[2])
-        assert head == f'{{"format":1,"catalog":1,"group":"{group}","count":{len(lines)},"crc32":"{crc:08x}"}}'
+        assert head == f'{{"format":2,"catalog":1,"group":"{group}","count":{len(lines)},"crc32":"{crc:08x}"}}'
         assert lines == [
-            line({**entry_or_refused(word), "word": word, "group": group}) for word in sorted(source().groups[group]())
+            line({**entry_or_refused(word), "key": word, "group": group}) for word in sorted(source().groups[group]())
         ]
         assert b"null" not in data
 
@@ -99,7 +99,7 @@ def test_what_a_build_says_is_what_it_did(tmp_path: Path):
     told: list[tuple[str, int, int]] = []
     done = build(tmp_path / "new", ["d"], source=source(), tell=lambda *step: told.append(step))
     assert [each.to_dict() for each in done] == [
-        {"group": "d", "words": 18, "now": 18, "before": 0, "file": str(tmp_path / "new" / "d.jsonl")}
+        {"group": "d", "keys": 18, "now": 18, "before": 0, "file": str(tmp_path / "new" / "d.jsonl")}
     ]
     assert told == [("d", i, 18) for i in range(19)]
 
@@ -161,7 +161,7 @@ def test_a_torn_journal_is_read_up_to_where_it_is_whole(
 ):
     """Cut anywhere, with rubbish at the end or zeros in a line: what is whole is kept, and appended to."""
     path = tmp_path_factory.mktemp("torn") / "x.part"
-    lines = [line({**entry(f"(w{i})"), "word": f"(w{i})", "group": "x"}) for i in range(8)]
+    lines = [line({**entry(f"(w{i})"), "key": f"(w{i})", "group": "x"}) for i in range(8)]
     with Journal(path, "x") as journal:
         head = path.stat().st_size
         journal.add((f"(w{i})", text) for i, text in enumerate(lines))
@@ -187,7 +187,7 @@ def test_a_record_is_on_the_disk_before_the_next_is_made(tmp_path: Path, monkeyp
     sizes: list[int] = []
     with Journal(tmp_path / "x.part", "x") as journal:
         for word in source().groups["c"]():
-            journal.add([(word, line({"word": word, "group": "x"}))])
+            journal.add([(word, line({"key": word, "group": "x"}))])
             sizes.append((tmp_path / "x.part").stat().st_size)
     assert safe[1:] == sizes == sorted(set(sizes))
 
@@ -195,10 +195,10 @@ def test_a_record_is_on_the_disk_before_the_next_is_made(tmp_path: Path, monkeyp
 def test_a_journal_of_something_else_is_refused(tmp_path: Path):
     path = tmp_path / "c.jsonl.part"
     for text, said in [
-        ("a list\nof words\n", "a journal without checksums"),
-        ('{"format":1,"catalog":1,"group":"c"}\n', "a journal without checksums .*removed, or --anew"),
-        (seal_line("words") + "\n", "not a head"),
-        (seal_line('{"format":1,"catalog":99}') + "\n", "another version"),
+        ("a list\nof words\n", "journal without checksums"),
+        ('{"format":2,"catalog":1,"group":"c"}\n', "journal without checksums .* Remove the file or use --anew"),
+        (seal_line("keys") + "\n", "not a head"),
+        (seal_line('{"format":2,"catalog":99}') + "\n", "another version"),
     ]:
         path.write_text(text)
         with pytest.raises(BadRequest, match=said):
@@ -282,7 +282,7 @@ def test_kin_are_made_in_one_process():
 
 def test_a_worker_that_dies_stops_the_build_in_one_line(tmp_path: Path, whole: dict[str, bytes]):
     pytest.importorskip("joblib")
-    with pytest.raises(BuildStopped, match=r"a worker process died; what was built is kept in .*d\.jsonl\.part"):
+    with pytest.raises(BuildStopped, match=r"a worker process died; finished work is kept in .*d\.jsonl\.part"):
         build(tmp_path, source=replace(source(), entry=died), workers=2)
     assert (tmp_path / "c.jsonl").read_bytes() == whole["c.jsonl"]
     (first, _) = build(tmp_path, source=source())
@@ -295,7 +295,9 @@ def test_a_worker_that_dies_stops_the_build_in_one_line(tmp_path: Path, whole: d
 def test_a_defect_names_its_word_and_loses_nothing(workers: int, tmp_path: Path):
     if workers > 1:
         pytest.importorskip("joblib")
-    with pytest.raises(BuildStopped, match=r"\(c05\): a defect .*IndexError: list index.*; what was built is kept in"):
+    with pytest.raises(
+        BuildStopped, match=r"\(c05\): internal error: IndexError: list index.*; finished work is kept in"
+    ):
         build(tmp_path, source=replace(source(), entry=broken), workers=workers)
     assert (tmp_path / "c.jsonl.part").exists()
 
@@ -335,7 +337,7 @@ def test_a_disk_full_at_the_end_keeps_the_journal(name: str, tmp_path: Path, mon
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(os, "replace", full)
-    with pytest.raises(BuildStopped, match=r"No space left on device; what was built is kept in .*\.part"):
+    with pytest.raises(BuildStopped, match=r"No space left on device; finished work is kept in .*\.part"):
         build(tmp_path / name, ["d"], source=source())
     monkeypatch.undo()
     assert not list(tmp_path.rglob("*.tmp"))
@@ -362,7 +364,7 @@ def test_files_round_trip_and_cut_off_ones_are_refused(whole: dict[str, bytes]):
     for cut in range(0, len(data), 37):
         with pytest.raises(BadRequest):
             decode_lines(data[:cut], "c")
-    with pytest.raises(BadRequest, match=r"another version: got 'format 1, words 9', expected .*build it again"):
+    with pytest.raises(BadRequest, match=r"another version: got 'format 2, keys 9', expected .*Build it again"):
         decode_lines(data.replace(b'"catalog":1', b'"catalog":9', 1), "c")
 
 

@@ -58,7 +58,7 @@ def test_a_list_reads_only_the_entries_that_it_prints():
             self.read += len(found) if isinstance(place, slice) else 1
             return found
 
-    records = Read([{"word": str(i), "refused": "so"} for i in range(1000)])
+    records = Read([{"key": str(i), "refused": "so"} for i in range(1000)])
     told = entries(records, 2000).splitlines()
     assert [line.split()[0] for line in told[2:-2]] == [str(i) for i in range(SHOWN)]
     assert told[-1].startswith("1000 of 2000 architectures, the first 100 shown")
@@ -69,7 +69,7 @@ def test_a_list_reads_only_the_entries_that_it_prints():
 def test_why_a_word_is_refused_makes_no_column_wide():
     reason = "the mechanism cannot move " * 8
     seen = {
-        "word": "a",
+        "key": "a",
         "notation": "3-RRR",
         "dof": 3,
         "motion": "2T1R",
@@ -77,7 +77,7 @@ def test_why_a_word_is_refused_makes_no_column_wide():
         "rank": 3,
         "fewest": 3,
     }
-    told = entries([seen, {"word": "b", "notation": "3-PPP", "refused": reason}], 2).splitlines()
+    told = entries([seen, {"key": "b", "notation": "3-PPP", "refused": reason}], 2).splitlines()
     assert max(map(len, told)) <= LINE
     assert "refused" in told[3]
     words = [*told[3].split()[3:], *" ".join(told[4:-2]).split()]
@@ -134,7 +134,7 @@ def test_show_draws_and_writes_a_robot(run, tmp_path: Path):
     store = tmp_path / "real"
     word = "3(Rz*-Rz-Rz)"
     facts = {
-        "word": word,
+        "key": word,
         "group": "g",
         "notation": "3-R*RR",
         "hidden": "3-PiR*R",
@@ -142,7 +142,7 @@ def test_show_draws_and_writes_a_robot(run, tmp_path: Path):
         "dof": 3,
         "motion": "2T1R",
         "mobility": 3,
-        "idle": 0,
+        "internal": 0,
         "verdict": "controllable",
         "rank": 3,
         "exact": True,
@@ -151,7 +151,7 @@ def test_show_draws_and_writes_a_robot(run, tmp_path: Path):
         "base_motors": True,
         "fewest": 3,
         "minimal": [["1", "2", "3"]],
-        "lost": [],
+        "unobserved": [],
         "modes_bound": 6,
         "modes_seen": 2,
         "condition": "the lines meet in a point",
@@ -163,7 +163,7 @@ def test_show_draws_and_writes_a_robot(run, tmp_path: Path):
     for line in (
         r"3\(Rz\*-Rz-Rz\)   3-R\*RR",
         r"legs 1, 2, 3  base ── Rz\* ── Rz ══ Rz ── platform",
-        r"dof +3, 2T1R \(mobility 3, of which 0 idle\)",
+        r"dof +3, 2T1R \(mobility 3, of which 0 internal\)",
         r"verdict +controllable \(rank 3 of 3\)",
         r"exact +proved",
         r"legs needed +\{1, 2, 3\}",
@@ -195,7 +195,7 @@ def test_each_smallest_set_has_the_hidden_robot_of_its_legs(run, word: str, tmp_
     assert all(each["problem"] is None for each in data["smallest"])
     for each in data["smallest"]:
         counted = each["legs"] == data["entry"].get("modes_legs")
-        assert each["near"] == (len(hrsynth.modes(file, observe=each["legs"]).near_modes) if counted else None)
+        assert each["near_matches"] == (len(hrsynth.modes(file, observe=each["legs"]).near_modes) if counted else None)
     sets, told = [each["legs"] for each in data["smallest"]], hrsynth.legs(file).minimal
     assert sets == data["entry"]["minimal"]
     assert set(map(tuple, sets)) <= set(told)
@@ -211,14 +211,14 @@ def test_plates_are_told_apart_by_the_hidden_robots_of_pairs(run):
 
 def test_no_robot_of_a_refused_architecture_is_written(run, tmp_path: Path):
     file = tmp_path / "robot.urdf"
-    check_refused(run("show", "2(Px*-2SSy)", "-o", file), "no robot of a refused architecture is written: no confirmed")
+    check_refused(run("show", "2(Px*-2SSy)", "-o", file), "--output: the catalog refuses 2(Px*-2SSy): no confirmed")
     assert not file.exists()
 
 
 def test_show_studies_what_is_not_in_the_catalog(run, folder: Path):
     status, out, _ = run("show", "3(Rz*-Rz-Rz)", "--catalog", folder, "--json")
     assert status == 0
-    assert json.loads(out)["note"] == "not in the catalog, studied now"
+    assert json.loads(out)["note"] == "not in the catalog, analysed now"
 
 
 @pytest.mark.parametrize(
@@ -240,21 +240,23 @@ def test_drawings_show_motors_and_watched_links(word: str, legs: list[str]):
 
 def test_bad_input_is_one_line(run, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
-    check_refused(run("build"), "nowhere to build")
+    check_refused(run("build"), "build needs --output")
     package = Path(hrsynth.__file__).parent
-    check_refused(run("build", "-o", package / "catalog" / "new"), "cannot build into the package")
+    check_refused(run("build", "-o", package / "catalog" / "new"), "inside the installed package")
     check_refused(run("build", "nothing", "-o", tmp_path / "new"), "unknown group: got 'nothing', expected c, d")
-    check_refused(run("build", "-o", tmp_path / "new", "--sample", 3), "--sample without --check")
-    check_refused(run("build", "-o", folder, "--check", "--anew"), "--anew with --check")
+    check_refused(run("build", "-o", tmp_path / "new", "--sample", 3), "--sample: needs --check")
+    check_refused(run("build", "-o", folder, "--check", "--anew"), "--anew: not possible with --check")
     check_refused(run("build", "-o", tmp_path / "new", "--workers", 0), "--workers")
     check_refused(run("build", "-o", tmp_path / "no" / "where"), "No such file or directory")
-    check_refused(run("list", "--catalog", tmp_path / "nowhere"), "no such catalog")
+    check_refused(run("list", "--catalog", tmp_path / "nowhere"), "not found")
     check_refused(run("list", "--dof", "many"), "--dof")
     for legs in ("banana", "9", "", "3-r*"):
-        check_refused(run("list", "--catalog", folder, "--legs", legs), "such legs")
-        check_refused(run("site", "-o", tmp_path / "site", "--catalog", folder, "--legs", legs), "such legs")
-    check_refused(run("list", "--catalog", folder, "--motion", "9T"), "has this --motion")
-    check_refused(run("list", "--catalog", folder, "--dof", 9), "has this --dof")
+        check_refused(run("list", "--catalog", folder, "--legs", legs), "--legs: no such entry")
+        check_refused(
+            run("site", "-o", tmp_path / "site", "--catalog", folder, "--legs", legs), "--legs: no such entry"
+        )
+    check_refused(run("list", "--catalog", folder, "--motion", "9T"), "--motion: no such entry")
+    check_refused(run("list", "--catalog", folder, "--dof", 9), "--dof: no such entry")
     check_refused(run("show", "", "--catalog", folder), "no architecture of the catalog")
     check_refused(run("show", "nope", "--catalog", folder), "hrsynth catalog list --text nope")
     check_refused(run("show", "no pe", "--catalog", folder), "hrsynth catalog list --text 'no pe'")
@@ -268,7 +270,7 @@ def test_bad_input_is_one_line(run, folder: Path, tmp_path: Path, monkeypatch: p
 
 def test_what_is_seen_is_no_name_to_search_for(run, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("hrsynth.catalog.query.find_named", None)
-    check_refused(run("show", "3(Rz*-Rz-Rz)@nosuch"), "kinds such as 3point")
+    check_refused(run("show", "3(Rz*-Rz-Rz)@nosuch"), "of a kind, such as 3point")
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")

@@ -76,13 +76,13 @@ def plain() -> tuple[dict[str, Any], ...]:
 def _with_motors(record: dict[str, Any]) -> dict[str, Any]:
     if "choices" not in record:
         joints = [
-            JOINT.fullmatch(part) for leg in re.findall(r"[(]([^()]*)[)]", record["word"]) for part in leg.split("-")
+            JOINT.fullmatch(part) for leg in re.findall(r"[(]([^()]*)[)]", record["key"]) for part in leg.split("-")
         ]
         return record | {
             "motors": {each[1] for each in joints if each and each[2]},
             "parallelograms": any(each is None or each[1] in ("Pi", "2SS", "2US") for each in joints),
         }
-    letters = record["word"].lstrip("P").lstrip("0123456789")
+    letters = record["key"].lstrip("P").lstrip("0123456789")
     working = [each for each in record["choices"] if each["rank"] == record["dof"]] or record["choices"]
     return record | {"motors": {letters[j - 1] for leg in working[0]["joints"] for j in leg}, "parallelograms": False}
 
@@ -93,8 +93,8 @@ def test_a_question_is_answered_as_a_plain_count_answers_it(question: str, capsy
     options, asked, count = QUESTIONS[question]
     assert execute(["catalog", "list", *shlex.split(options), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
-    wanted = [each["word"] for each in plain() if all(each[name] == value for name, value in asked.items())]
-    assert sorted(each["word"] for each in told["entries"]) == sorted(wanted)
+    wanted = [each["key"] for each in plain() if all(each[name] == value for name, value in asked.items())]
+    assert sorted(each["key"] for each in told["entries"]) == sorted(wanted)
     assert len(wanted) == count
     assert {each["group"] for each in plain()} == set(told["groups"])
     assert told["total"] == sum(store(ALL).count(name) for name in told["groups"])
@@ -111,7 +111,7 @@ def test_sqlite_files_answer_as_lines_do(tmp_path: Path):
         {"parallelograms": False, "motion": "3T1R"},
         {"driven": False, "parallelograms": True},
     ):
-        assert [each["word"] for each in load(file, **asked)] == [each["word"] for each in load(file).where(**asked)]
+        assert [each["key"] for each in load(file, **asked)] == [each["key"] for each in load(file).where(**asked)]
 
 
 @pytest.mark.parametrize(

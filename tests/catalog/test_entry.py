@@ -64,7 +64,7 @@ def test_an_entry_says_what_the_shipped_robot_says(name):
     hidden = None if robot.hidden_architecture is None else robot.hidden_architecture.ascii
     assert found["hidden"] == hidden
     assert (found["verdict"], found["rank"], found["dof"]) == (robot.verdict.verdict, robot.verdict.rank, robot.dof)
-    assert (found["mobility"], found["idle"]) == (robot.mobility.total, robot.mobility.internal)
+    assert (found["mobility"], found["internal"]) == (robot.mobility.total, robot.mobility.internal)
     assert found["exact"]
     assert found["driven"]
 
@@ -164,7 +164,7 @@ def test_what_is_driven_changes_nothing_else():
             )
         )
         one, two = entry(text), entry(other)
-        for field in one.keys() - {"word", "notation", "motors", "motor_rank", "driven", "base_motors"}:
+        for field in one.keys() - {"key", "notation", "motors", "motor_rank", "driven", "base_motors"}:
             assert one[field] == two[field]
 
 
@@ -189,7 +189,9 @@ def test_verdicts_are_exact_and_confirmed(name):
         found = entry(text)
         assert "refused" in found or (found["exact"] and found["confirmed"] >= 5)
         if "refused" not in found:
-            assert (found["verdict"] == "controllable") == (found["rank"] == found["dof"]) == (found["cure"] is None)
+            assert (
+                (found["verdict"] == "controllable") == (found["rank"] == found["dof"]) == (found["suggestion"] is None)
+            )
             assert found["modes_seen"] is None or 1 <= found["modes_seen"] <= found["modes_bound"]
 
 

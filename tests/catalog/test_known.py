@@ -28,7 +28,7 @@ def records(group: str) -> list[dict[str, object]]:
 
 @pytest.mark.slow
 def test_every_known_robot_is_in_the_catalog_under_its_canonical_word():
-    held = {bare(str(each["word"])) for group in GROUPS for each in records(group) if "!" not in str(each["word"])}
+    held = {bare(str(each["key"])) for group in GROUPS for each in records(group) if "!" not in str(each["key"])}
     assert set(aliases()) <= held
     assert all(str(parse(word)) == word for word in aliases())
 
@@ -37,9 +37,9 @@ def test_every_known_robot_is_in_the_catalog_under_its_canonical_word():
 @pytest.mark.parametrize("group", ["planar", "pods", "deltas"])
 def test_names_are_found_without_reading_every_word(group: str):
     for each in records(group):
-        name = alias(str(each["word"]))
-        assert is_called(each, "robot") == (name is not None and "robot" in name), each["word"]
-        assert is_called(each, "tripod") == (name is not None and "tripod" in name), each["word"]
+        name = alias(str(each["key"]))
+        assert is_called(each, "robot") == (name is not None and "robot" in name), each["key"]
+        assert is_called(each, "tripod") == (name is not None and "tripod" in name), each["key"]
 
 
 @pytest.mark.some(0, 2)
@@ -57,7 +57,7 @@ def test_names_are_found_without_reading_every_word(group: str):
 def test_show_takes_a_name_as_the_search_does(capsys, text: str, word: str):
     assert execute(["catalog", "show", text.strip("'"), "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
-    assert answer["entry"]["word"] == word
+    assert answer["entry"]["key"] == word
     assert (answer["note"] is None) == text.startswith("'")
 
 
@@ -88,9 +88,9 @@ def test_a_name_holds_whatever_is_driven_or_watched():
 
 def test_known_robots_come_first_then_those_with_equal_legs():
     words = ("(Rz*-Rz-Rz)+2(Ph*-Rz-Rz)", "3(Ph*-Pj-Rz)", "3(Rz*-Rz-Rz)", "3(Ra*!-Rb-Ra-Ph)")
-    facts = [{"word": word, "base_motors": True, "verdict": "controllable"} for word in words]
+    facts = [{"key": word, "base_motors": True, "verdict": "controllable"} for word in words]
     facts[3]["refused"] = "for some reason"
-    assert [each["word"] for each in sorted(facts, key=order)] == [words[k] for k in (2, 1, 0, 3)]
+    assert [each["key"] for each in sorted(facts, key=order)] == [words[k] for k in (2, 1, 0, 3)]
 
 
 def test_every_rule_has_its_sentence():
@@ -106,13 +106,13 @@ def test_every_cure_and_every_step_of_the_catalog_is_told_in_sentences(group: st
         for text in (*rules(each), *filter(None, [cure(each)])):
             assert re.fullmatch(r"[A-Z].*\.", text)
             assert "{" not in text
-        assert (cure(each) is None) == (not each.get("cure"))
-        for part in re.findall(r"(?:link|rod|joint)_\w+", str(each.get("cure", ""))):
+        assert (cure(each) is None) == (not each.get("suggestion"))
+        for part in re.findall(r"(?:link|rod|joint)_\w+", str(each.get("suggestion", ""))):
             assert f"({part})" in str(cure(each))
 
 
 def test_a_cure_names_what_is_measured_and_where():
-    assert cure({"dof": 3, "cure": "direction link_1_2 and encoder joint_3_1"}) == (
+    assert cure({"dof": 3, "suggestion": "direction link_1_2 and encoder joint_3_1"}) == (
         "Measure the direction of the link after joint 2 of leg 1 (link_1_2) and the encoder of joint 1 of leg 3 "
         "(joint_3_1) as well: then all 3 freedoms are seen."
     )

@@ -111,7 +111,7 @@ def test_records_are_those_of_twists() -> None:
     records = list(load(group="schoenflies"))
     assert records
     for record in records:
-        leg = parse(record["word"]).legs[0]
+        leg = parse(record["key"]).legs[0]
         letters, count = "".join(letters_of(leg)), sum(map(len, letters_of(leg)[: observed(leg) + 1]))
         seen = []
         for _ in range(4):
@@ -120,5 +120,5 @@ def test_records_are_those_of_twists() -> None:
             seen.append(np.cross(twists[3:, :count] @ rates[:count], rng.normal(size=3), axis=0))
         ranks = [int(np.linalg.matrix_rank(np.vstack(seen[:size]), ZERO)) for size in range(1, 5)]
         fewest = 1 + ranks.index(ranks[-1]) if ranks[-1] else 0
-        assert (record["rank"], record["fewest"]) == (ranks[-1], fewest), record["word"]
-        assert (record["motion"], record["mobility"], record["idle"]) == ("3T1R", 4, 0)
+        assert (record["rank"], record["fewest"]) == (ranks[-1], fewest), record["key"]
+        assert (record["motion"], record["mobility"], record["internal"]) == ("3T1R", 4, 0)

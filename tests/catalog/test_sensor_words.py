@@ -110,8 +110,8 @@ def test_known_answers():
     assert catalog["3(Rz*-Rz-Rz)@inclination"]["verdict"] == "uncontrollable"
     assert catalog["3(Rz*-Rz-Rz)@2point"]["verdict"] == "controllable"
     asked = load(sensor="3point")
-    assert {each["word"].partition("@")[2] for each in asked} == {"3point"}
-    assert {each["see"] for each in load(sensor="point+point+point")} == {"3point"}
+    assert {each["key"].partition("@")[2] for each in asked} == {"3point"}
+    assert {each["sensors"] for each in load(sensor="point+point+point")} == {"3point"}
     assert len(load(sensor="3point", verdict="controllable")) >= 5
     assert not any("@" in word for word in load().words)
 
@@ -128,7 +128,7 @@ def test_the_command_line_lists_and_shows_them(capsys: pytest.CaptureFixture[str
 
     listed = json.loads(call("list", "--sensor", "3point", "--verdict", "controllable", "--json")[1])
     assert listed["total"] == len(LISTED)
-    assert all(each["see"] == "3point" for each in listed["entries"])
+    assert all(each["sensors"] == "3point" for each in listed["entries"])
     Draft202012Validator(schema("catalog list")).validate(listed)
     shown = call("show", "6(Utn-Pl*-S)@3point")[1]
     assert "seen of the platform: 3point" in shown

@@ -53,7 +53,7 @@ def few() -> Catalog:
     """Three structures, four architectures, without derivations: what a folder does with them is quick to see."""
     return Catalog(
         tuple(
-            {"word": word, "group": "none", "legs": len(parse(word).legs), "refused": "to be quick"}
+            {"key": word, "group": "none", "legs": len(parse(word).legs), "refused": "to be quick"}
             for word in WORDS[:4]
         )
     )
@@ -105,7 +105,7 @@ def test_every_record_has_its_page_and_its_robot_file(made, catalog):
     assert done.pages == len(list((target / "p").iterdir())) == len(structures(catalog))
     for each in structures(catalog):
         page = (target / "p" / f"{each.name}.html").read_text(encoding="utf-8")
-        for word in (known["word"] for known in each.records):
+        for word in (known["key"] for known in each.records):
             assert f'data-name="{address_name(word)}"' in page
             assert word in page
             assert (target / "r" / f"{address_name(word)}.urdf").is_file() == (word != REFUSED)
@@ -135,7 +135,7 @@ def test_drawings_are_well_formed_and_show_the_motors_and_the_virtual_actuators(
         assert drawn.pop(0).get("aria-label").startswith("Drawing of")
         assert len(drawn) == 1 + bool(each.fact.get("hidden"))
         motors = [g for g in drawn[0].iter("{*}g") if g.get("class") == "motor"]
-        assert len(motors) == sum(joint.motor for leg in parse(each.fact["word"]).legs for joint in leg.joints)
+        assert len(motors) == sum(joint.motor for leg in parse(each.fact["key"]).legs for joint in leg.joints)
         for hidden in drawn[1:]:
             assert [g for g in hidden.iter("{*}g") if g.get("class") == "virtual"]
 
@@ -180,11 +180,11 @@ def test_columns_hold_what_the_records_hold(catalog):
     every = structures(catalog)
     held = columns(every)
     records = [each for structure in every for each in structure.records]
-    assert sorted(held["word"]) == sorted(WORDS)
+    assert sorted(held["key"]) == sorted(WORDS)
     for i, each in enumerate(records):
-        assert held["word"][i] == each["word"]
+        assert held["key"][i] == each["key"]
         assert each in every[held["page"][i]].records
-        assert held["name"][i] == address_name(each["word"])
+        assert held["name"][i] == address_name(each["key"])
         for field in NUMBERS:
             assert held[field][i] == each.get(field)
         for field in TEXTS + LISTS:
@@ -202,12 +202,12 @@ def unmarked(word: str) -> set[str]:
 
 def test_structures_part_the_records_and_kin_differ_by_what_is_watched(catalog):
     every = structures(catalog)
-    assert sorted(each["word"] for each in chain.from_iterable(s.records for s in every)) == sorted(WORDS)
+    assert sorted(each["key"] for each in chain.from_iterable(s.records for s in every)) == sorted(WORDS)
     words = {each.word: each for each in every}
     assert len(words) == len(every)
     for each in every:
         assert Structure.unpack(each.pack()) == each
-        assert {str(parse(record["word"]).unmoved) for record in each.records} == {str(parse(each.word).unmoved)}
+        assert {str(parse(record["key"]).unmoved) for record in each.records} == {str(parse(each.word).unmoved)}
         for other, verdict in each.kin:
             assert unmarked(other) == unmarked(each.word)
             assert verdict == words[other].fact.get("verdict", "refused")
@@ -217,7 +217,7 @@ def test_structures_part_the_records_and_kin_differ_by_what_is_watched(catalog):
 
 def test_motors_that_change_what_is_known_part_a_structure():
     facts = [
-        {"word": word, "group": "none", "rank": rank} for word, rank in (("3(Ra*-Ro-Ro-Ro)", 0), ("3(Ra-Ro*-Ro-Ro)", 3))
+        {"key": word, "group": "none", "rank": rank} for word, rank in (("3(Ra*-Ro-Ro-Ro)", 0), ("3(Ra-Ro*-Ro-Ro)", 3))
     ]
     assert [(each.word, each.fact["rank"]) for each in structures(facts)] == [
         ("3(Ra-Ro*-Ro-Ro)", 3),
@@ -232,7 +232,7 @@ def test_names_are_stable_and_distinct():
 
 
 def test_what_stands_in_a_page_is_made_safe():
-    fact = {"word": "3(S-S)", "group": "none", "refused": "<b>1 < 2 & 'so'"}
+    fact = {"key": "3(S-S)", "group": "none", "refused": "<b>1 < 2 & 'so'"}
     shown = page(Structure("3(S-S)<u>", (fact,)), Study(0, differs="<i>"), {}, None)
     assert not [tag for tag in ("<b>", "<i>", "<u>") if tag in shown]
     assert Page(shown).links[:2] == ["data:,", "../report.css"]
@@ -263,7 +263,7 @@ def test_other_folders_are_left_alone(few, tmp_path):
     assert "thesis.tex" in refused(tmp_path / "mine", few)
     assert "not a folder" in refused(tmp_path / "mine" / "thesis.tex", few)
     assert "no such folder" in refused(tmp_path / "none" / "site", few)
-    assert "no architectures" in refused(tmp_path / "new", Catalog(()))
+    assert "no architecture fits" in refused(tmp_path / "new", Catalog(()))
     (tmp_path / ".new.part").mkdir()
     (tmp_path / ".new.part" / "thesis.tex").write_text("years")
     assert "thesis.tex" in refused(tmp_path / "new", few)
@@ -344,8 +344,8 @@ def test_on_the_command_line(few, tmp_path, capsys, monkeypatch):
     monkeypatch.delenv("HRSYNTH_DEBUG", raising=False)
     kept = tmp_path / "kept"
     kept.mkdir()
-    lines = sorted(map(line, few), key=lambda text: json.loads(text)["word"])
-    head = json.dumps({"format": 1, "catalog": 1, "group": "none", "count": len(lines)})
+    lines = sorted(map(line, few), key=lambda text: json.loads(text)["key"])
+    head = json.dumps({"format": 2, "catalog": 1, "group": "none", "count": len(lines)})
     (kept / "none.jsonl").write_text("\n".join([head, *lines]) + "\n")
     common = ["catalog", "site", "--catalog", str(kept)]
     assert execute([*common, "-o", str(tmp_path / "site"), "--legs", "2", "--json"]) == 0

@@ -127,7 +127,7 @@ def test_the_same_word_has_the_same_geometry_whatever_is_driven():
         ("13(Rz*-Rz-Rz)", "13"),
         ("ball:3(Rz*-Rz-Rz)", "ball"),
         ("3Rz", "3Rz"),
-        ("bar:4(Rt*-2SSt)", "bodies"),
+        ("bar:4(Rt*-2SSt)", "platform links"),
         ("3(Rz!-Rz!-Rz)", "observed"),
         ("3(Rz-Rz-Rz!)", "platform"),
         ("", "''"),
@@ -148,5 +148,5 @@ def test_what_is_no_word_is_refused(text, told):
 def test_axes_of_a_u_must_be_at_right_angles():
     with pytest.raises(BadRequest, match="right angles"):
         mechanism(parse("3(Uxk-Pl*-S)"))
-    with pytest.raises(BadRequest, match="by itself"):
+    with pytest.raises(BadRequest, match="other than n or q"):
         mechanism(parse("3(Unq-Pl*-S)"))

@@ -38,7 +38,7 @@ class Witness:
 
     @cached_property
     def oracle(self) -> Oracle:
-        drawn = mechanism(model(parse(self.record["word"])), self.record.get("attempt", 0))
+        drawn = mechanism(model(parse(self.record["key"])), self.record.get("attempt", 0))
         return Oracle(normal_form(drawn).mechanism)
 
     @cached_property
@@ -58,7 +58,7 @@ class Witness:
     def seen(self, state: Array, legs: Sequence[str]) -> tuple[int, int, int]:
         """dof, how many of its turns are independent, and the freedoms that some legs see. Raises ``Undecided``."""
         relation = self.oracle.relation(
-            state, [self.watched[leg] for leg in legs], point_only=parse(self.record["word"]).platform == "point"
+            state, [self.watched[leg] for leg in legs], point_only=parse(self.record["key"]).platform == "point"
         )
         rows, columns = len(relation) - 3 * len(legs), relation.shape[1]
         _, values, right = np.linalg.svd(np.vstack((relation[rows:], np.zeros((columns, columns)))))
@@ -81,7 +81,7 @@ class Witness:
 
     def kinds(self, legs: Sequence[str]) -> tuple[str, ...]:
         """What the legs are: equal legs of one body can be exchanged."""
-        kinds = [f"{body}{leg}" for body, some in enumerate(model(parse(self.record["word"])).bodies) for leg in some]
+        kinds = [f"{body}{leg}" for body, some in enumerate(model(parse(self.record["key"])).bodies) for leg in some]
         return tuple(sorted(kinds[int(leg) - 1] for leg in legs))
 
     def weakest(self) -> float:
@@ -121,7 +121,7 @@ class Witness:
     def _pose(self, state: Array) -> Array:
         pose = self.oracle.pose(state, self.oracle.mechanism.platform).copy()
         pose[:3, 3] /= self.oracle.length
-        if parse(self.record["word"]).platform == "point":
+        if parse(self.record["key"]).platform == "point":
             pose[:3, :3] = 0
         return pose
 

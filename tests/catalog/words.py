@@ -77,7 +77,7 @@ def robot(task: tuple[str, int, int, int]) -> dict[str, Any]:
             answers *= seeds
             break
     return {
-        "word": text,
+        "key": text,
         "dimensions": dimensions,
         "answers": answers[:seeds],
         "seconds": round(time.process_time() - start, 2),
@@ -109,12 +109,12 @@ def summary(rows: list[dict[str, Any]]) -> str:
         for row in rows
     )
     lines = [
-        f"{len(rows)} robots of {len({row['word'] for row in rows})} words, "
+        f"{len(rows)} robots of {len({row['key'] for row in rows})} words, "
         f"{sum(row['seconds'] for row in rows):.0f} s of processor time"
     ]
     lines += [f"  {count:6d}  {kind}" for kind, count in kinds.most_common()]
     lines += [
-        f"{defect(row)}: {row['word']} dimensions {row['dimensions']}: {Counter(row['answers']).most_common()}"
+        f"{defect(row)}: {row['key']} dimensions {row['dimensions']}: {Counter(row['answers']).most_common()}"
         for row in rows
         if defect(row)
     ]
@@ -134,7 +134,7 @@ def main(arguments: list[str] | None = None) -> int:
     asked = parser.parse_args(arguments)
     text = asked.output.read_text(encoding="utf-8") if asked.output.exists() else ""
     rows = [json.loads(line) for line in text.splitlines()]
-    left = tasks(asked, {(row["word"], row["dimensions"]) for row in rows})
+    left = tasks(asked, {(row["key"], row["dimensions"]) for row in rows})
     with asked.output.open("a", encoding="utf-8") as file, multiprocessing.Pool(asked.workers) as pool:
         for row in pool.imap_unordered(robot, left, chunksize=4):
             rows.append(row)

@@ -150,12 +150,13 @@ def analysis(
                     ", ".join(source.bodies),
                     remedy="Name a <platform> in the file, or use derive, legs or check.",
                 )
-            if any(given.get(name) is not None for name in ("seconds", "into")):
+            if given.get("into") is not None:
                 return function(*bound.args, **bound.kwargs)
             every = known.bind(*args, **given)
             every.apply_defaults()
             if "observe" in every.arguments:
-                every.arguments["observe"] = legs_asked(robot, every.arguments["observe"], every.arguments.get("see"))
+                sensor = every.arguments.get("sensor")
+                every.arguments["observe"] = legs_asked(robot, every.arguments["observe"], sensor)
             told = [(name, content(value)) for name, value in every.arguments.items() if name != "robot"]
             key = (function.__qualname__, robot, source.file, source.notes, source.options, source.sha256, *told)
             try:

@@ -1,24 +1,24 @@
-"""Words of architectures: legs as chains of joints whose axes are named, robots as multisets of legs on a platform.
+"""Architecture keys: legs as chains of joints with named axes, robots as multisets of legs on a platform.
 
-A word says what stays so in motion and nothing else, no lengths::
+A key has the incidences that hold at all poses, and no lengths::
 
-    robot    = [platform ":"] legs ["|" legs] ["@" sights]
-    platform = "point" (all legs end on one R axis) or "bar" / "slide" (two plates, joined by a bar on two R and its
-               parallel twin, or by a P; "|" parts the legs of the one from those of the other)
+    robot    = [platform ":"] legs ["|" legs] ["@" sensors]
+    platform = "point" (all legs end on one R axis) or "bar" / "slide" (two plates, joined by two parallel
+               bars on R joints, or by a P; "|" separates the legs of the two plates)
     legs     = [count] "(" joint ("-" joint)* ")", several joined by "+"
     joint    = letter axes ["*"] ["!"]
     letter   = R P C (one axis), U (two, at right angles), S (none), Pi (the normal of a parallelogram), 2SS (two equal
                parallel rods between S joints, the axis along their distance), 2US (the same with U at the upper ends)
 
-    sights   = [count] kind ["'"], several joined by "+": what cameras on the base, or IMUs, see of the platform in the
-               place of the legs; ``'`` gives each a camera of its own, the others have one in common
+    sensors  = [count] kind ["'"], several joined by "+": observations of the platform by cameras on the base, or IMUs,
+               instead of the legs; ``'`` gives each its own camera, the others share one
 
 ``*`` marks a motor, ``!`` the joint after which the observed link follows (of two rods, the first of them), where it is
 not the default segment. Axes are directions at the zero configuration, named by
 
 =======  ==============================================================================================================
 x y z    the base's axes: the same direction for all legs; z is the normal of a planar robot
-t r      the tangent and the radius of the leg's foot on the base
+t r      the tangent and the radius at the leg's end on the base
 k        some direction of the leg's own normal to t
 h j m    directions of the leg's own normal to z
 a b c    directions of the leg's own, in general position
@@ -28,9 +28,9 @@ n q      in a U: normal to its other axis, and (n) to the line of centres next t
          the joint before it and to its rods
 =======  ==============================================================================================================
 
-The canonical word has its legs sorted, first as if they had no motors (a motor changes no leg's label), names letters
-of the same kind in the order of the leg, and drops the ``!`` of a default segment. It is the key of the catalog and is
-stable: a change of what a word means is a change of ``VERSION``.
+The canonical key has its legs sorted, first as if they had no motors (a motor changes no leg's label), names letters
+of the same kind in the order of the leg, and drops the ``!`` of a default segment. It is stable: a new
+meaning changes ``VERSION``.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ VERSION = 1
 AXES = {"R": 1, "P": 1, "C": 1, "U": 2, "S": 0, "Pi": 1, "2SS": 1, "2US": 1}
 """How many axes each letter has."""
 FREEDOMS = {"R": 1, "P": 1, "C": 2, "U": 2, "S": 3, "Pi": 1, "2SS": 4, "2US": 4}
-"""Freedoms of each letter (idle ones left out)."""
+"""Dof of each letter without internal motion."""
 COMPOSITE = ("Pi", "2SS", "2US")
 MOVED = ("R", "P", "C", "U")
 """Letters that can have a motor."""
@@ -61,7 +61,7 @@ NAMES = "xyztrkhjmabclonq"
 ALIKE = ("hjm", "abc")
 """Names that stand for the same kind of direction, in the order in which a leg uses them."""
 SENSORS = "sensors"
-"""The group of words whose platform is seen; all others watch legs."""
+"""Group of keys with sensors; all others observe legs."""
 PLATFORMS = {"": 1, "point": 1, "bar": 2, "slide": 2}
 """Platforms, and the bodies on which legs end."""
 
@@ -103,7 +103,7 @@ class LegKey:
 
     @property
     def freedoms(self) -> int:
-        """Freedoms of the leg's end."""
+        """Dof of the leg's end."""
         return sum(FREEDOMS[joint.letter] for joint in self.joints)
 
     @cached_property
@@ -178,7 +178,7 @@ class LegKey:
 
 @dataclass(frozen=True, order=True)
 class SightWord:
-    """An observation of the platform: its kind, and whether by a camera of its own."""
+    """Observation of the platform: its kind, and True for its own camera."""
 
     kind: str
     own: bool = False
@@ -189,8 +189,7 @@ class SightWord:
 
 @dataclass(frozen=True)
 class ArchitectureKey:
-    """An architecture: a platform and, for each of its bodies, the legs that end on it, sorted; and what is seen of the
-    platform instead of the legs, sorted too."""
+    """Architecture: a platform, the sorted legs that end on each of its links, and its sorted sensors."""
 
     platform: str
     bodies: tuple[tuple[LegKey, ...], ...]
@@ -249,33 +248,34 @@ def count_equal(symbols: Iterable[LegKey | SightWord]) -> str:
 
 
 def parse(text: str) -> ArchitectureKey:
-    """The word that ``text`` writes, canonical; raises ``BadRequest`` with what is wrong in it."""
+    """Parse a key into canonical form; raises ``BadRequest``."""
     robot, at, seen = text.strip().partition("@")
     platform, colon, rest = robot.rpartition(":")
     if platform not in PLATFORMS or bool(colon) != bool(platform):
-        raise BadRequest(f"word {text!r}: unknown platform", platform, [name for name in PLATFORMS if name])
+        raise BadRequest(f"key {text!r}: unknown platform", platform, [name for name in PLATFORMS if name])
     bodies = [_legs(text, part) for part in rest.split("|")]
     if len(bodies) != PLATFORMS[platform]:
-        raise BadRequest(f"word {text!r}: bodies on which legs end", len(bodies), str(PLATFORMS[platform]))
+        raise BadRequest(f"key {text!r}: number of platform links", len(bodies), str(PLATFORMS[platform]))
     word = ArchitectureKey.of(*bodies, platform=platform, seen=sights(seen) if at else ())
     if at and any(leg.observed is not None for leg in word.legs):
-        raise BadRequest(f"word {text!r}: links of legs are not watched", "!", "no ! where something else is seen")
+        raise BadRequest(f"key {text!r}: sensors replace observed links", remedy="Omit ! or the part after @.")
     if not 2 <= len(word.legs) <= LARGEST_WORD:
-        raise BadRequest(f"word {text!r}: number of legs", len(word.legs), f"2 to {LARGEST_WORD}")
+        raise BadRequest(f"key {text!r}: number of legs", len(word.legs), f"2 to {LARGEST_WORD}")
     return word
 
 
 def sights(text: str) -> tuple[SightWord, ...]:
-    """What is seen of the platform, canonical; raises ``BadRequest``."""
+    """Parse sensors, in canonical order; raises ``BadRequest``."""
     known, found = [name for name, kind in kinds().items() if not issubclass(kind, Encoder)], list[SightWord]()
     for term in text.split("+"):
         match = _SIGHTS.fullmatch(term.strip())
         count = int(match["count"][:LONGEST_COUNT] or 1) if match else 0
         if match is None or match["kind"] not in known or not 1 <= count <= LARGEST_WORD:
             raise BadRequest(
-                f"what is seen, {text!r}: cannot be read",
+                f"sensors {text!r}: unknown term",
                 term,
-                f"kinds such as 3point, joined by +: {', '.join(known)}; up to {LARGEST_WORD}",
+                known,
+                remedy=f"Write 1 to {LARGEST_WORD} of a kind, such as 3point, and join kinds by +.",
             )
         found += [SightWord(match["kind"], bool(match["own"]))] * count
     return tuple(sorted(found))
@@ -286,10 +286,10 @@ def _legs(text: str, part: str) -> list[LegKey]:
     for term in part.split("+"):
         match = _LEGS.fullmatch(term.strip())
         if match is None:
-            raise BadRequest(f"word {text!r}: cannot be read", term, "legs such as 3(Rz*-Rz-Rz), joined by +")
+            raise BadRequest(f"key {text!r}: no legs", term, remedy="Write legs such as 3(Rz*-Rz-Rz), joined by +.")
         count = int(match["count"][:LONGEST_COUNT] or 1)
         if not 1 <= count <= LARGEST_WORD:
-            raise BadRequest(f"word {text!r}: number of equal legs", count, f"1 to {LARGEST_WORD}")
+            raise BadRequest(f"key {text!r}: number of equal legs", count, f"1 to {LARGEST_WORD}")
         try:
             leg = _known_leg(match["leg"])
         except BadRequest:
@@ -307,28 +307,28 @@ def _known_leg(chain: str) -> LegKey:
 def _leg(text: str, chain: str) -> LegKey:
     joints = tuple(_joint(text, part) for part in chain.split("-"))
     if joints[0].letter == "Pi" and joints[0].axes == "n":
-        raise BadRequest(f"word {text!r}: the Pi's normal is normal to the axis before it", chain, "a joint before it")
+        raise BadRequest(f"key {text!r}: axis n of the first joint", chain, remedy="Put a joint before Pin.")
     if sum(joint.watched for joint in joints) > 1:
-        raise BadRequest(f"word {text!r}: observed links of one leg", sum(joint.watched for joint in joints), "one")
+        raise BadRequest(f"key {text!r}: observed links of one leg", sum(joint.watched for joint in joints), "1")
     if joints[-1].watched and joints[-1].letter not in COMPOSITE:
-        raise BadRequest(f"word {text!r}: observed", "the platform", "a link of the leg")
+        raise BadRequest(f"key {text!r}: the platform is observed", chain, remedy="Put ! after another joint.")
     if len(joints) == 1 and joints[0].letter not in COMPOSITE:
-        raise BadRequest(f"word {text!r}: a leg of one joint has no segment to observe", chain, "two joints or more")
+        raise BadRequest(f"key {text!r}: a leg of one joint has no segment", chain, remedy="Use two joints or more.")
     return LegKey(joints)
 
 
 def _joint(text: str, part: str) -> JointSymbol:
     match = _JOINT.fullmatch(part)
     if match is None:
-        raise BadRequest(f"word {text!r}: unknown joint", part, f"a letter of {', '.join(AXES)}, axes, * and !")
+        raise BadRequest(f"key {text!r}: unknown joint", part, f"{', '.join(AXES)} with axes, * and !")
     letter, axes = match["letter"], match["axes"]
     if len(axes) != AXES[letter]:
-        raise BadRequest(f"word {text!r}: axes of {part!r}", len(axes), f"{AXES[letter]} for {letter}")
+        raise BadRequest(f"key {text!r}: axes of {part!r}", len(axes), f"{AXES[letter]} for {letter}")
     unknown = sorted(set(axes) - set(NAMES))
     if unknown:
-        raise BadRequest(f"word {text!r}: unknown axis in {part!r}", unknown[0], " ".join(NAMES))
+        raise BadRequest(f"key {text!r}: unknown axis in {part!r}", unknown[0], " ".join(NAMES))
     if letter != "U" and set(axes) & {"n", "q"} and (letter, axes) != ("Pi", "n"):
-        raise BadRequest(f"word {text!r}: axis n or q of {part!r}", letter, "a U, whose other axis it is normal to")
+        raise BadRequest(f"key {text!r}: axis n or q of {part!r}", letter, "U")
     if match["motor"] and letter not in MOVED:
-        raise BadRequest(f"word {text!r}: a motor on {part!r}", letter, MOVED)
+        raise BadRequest(f"key {text!r}: motor on {part!r}", letter, MOVED)
     return JointSymbol(letter, axes, bool(match["motor"]), bool(match["watched"]))

@@ -1,8 +1,7 @@
-"""Building the catalog: what the journal does not have yet is made, then a group is written whole; and checking whether
-what is stored is what would be built today.
+"""Building the catalog: entries missing in the journal are computed, then the group is written whole; and comparison of
+a stored catalog with what would be built today.
 
-The bytes depend on the words and their records alone: not on who made them, in what order, or how often the build was
-killed on the way.
+The bytes depend on the keys and their entries alone: not on processes, order or interruptions.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ CHUNK = 8
 """Least number of words that a worker is given at a time."""
 
 Tell = Callable[[str, int, int], None]
-"""Is told a group, how many of its records are there, and of how many: first of all groups, then of the one at work."""
+"""Callback with a group, the number of its finished entries and of all: first for each group, then during its build."""
 
 
 @dataclass(frozen=True)
@@ -79,8 +78,8 @@ def without_motors(word: str) -> str:
 
 
 def make_records(entry: Callable[[str], dict[str, Any]], group: str, words: Iterable[str]) -> Made:
-    """The records of words; a refused one says why, in one line. Raises ``Stopped`` for a defect of our own."""
-    return [(word, line({**_record(entry, word), "word": word, "group": group})) for word in words]
+    """Compute the lines of keys; a refused entry gives the reason. Raises ``Stopped`` for an internal error."""
+    return [(word, line({**_record(entry, word), "key": word, "group": group})) for word in words]
 
 
 def _record(entry: Callable[[str], dict[str, Any]], word: str) -> dict[str, Any]:
@@ -90,12 +89,12 @@ def _record(entry: Callable[[str], dict[str, Any]], word: str) -> dict[str, Any]
         return {"refused": "; ".join(error.lines())}
     except Exception as error:
         what = " ".join(f"{type(error).__name__}: {error}".split())
-        raise Stopped(f"{word}: a defect of hrsynth itself, please report it: {what}") from error
+        raise Stopped(f"{word}: internal error: {what}. Report it with the command") from error
 
 
 @dataclass(frozen=True)
 class Built:
-    """What a build did for one group: its words, those made now, and its file if it is complete."""
+    """Build of one group: the number of its keys, of entries computed now, and its file once complete."""
 
     group: str
     words: int
@@ -106,7 +105,7 @@ class Built:
     def to_dict(self) -> dict[str, Any]:
         return {
             "group": self.group,
-            "words": self.words,
+            "keys": self.words,
             "now": self.now,
             "before": self.before,
             "file": None if self.file is None else str(self.file),
@@ -205,10 +204,10 @@ def check(
     seed: int = 0,
     tell: Tell | None = None,
 ) -> tuple[str, ...]:
-    """What is stale in a stored catalog, one line each; nothing if it is what ``build`` would write.
+    """Return the differences of a stored catalog from what ``build`` would write, one line each.
 
-    The words of the groups (default: all) are compared one by one, and the records of all of them or of ``sample``
-    words of each group, drawn with ``seed``.
+    All keys of the groups (default: all) are compared, and all entries or those of ``sample`` keys of each group, drawn
+    with ``seed``.
     """
     source = source or architectures()
     kept = store(target) if isinstance(target, str | Path) else target
@@ -259,7 +258,7 @@ def _draw_words(words: list[str], count: int | None, seed: int) -> list[str]:
 def _count_parts(
     parts: Iterator[list[tuple[str, str]]], group: str, total: int, tell: Tell
 ) -> Iterator[list[tuple[str, str]]]:
-    """The parts, told as they pass."""
+    """Yield the parts and report them."""
     done = 0
     tell(group, done, total)
     for part in parts:

@@ -1,4 +1,4 @@
-"""What records are asked for, as SQL: each condition stands here once, for a SQLite file and for lines in memory."""
+"""Criteria of entries as SQL, for SQLite files and for lines in memory."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from typing import Any
 from ..budgets import LARGEST_RECORD
 from ..errors import BadRequest
 from .architecture_key import LONGEST_COUNT, MOVED, count_equal, sights
-from .jsonl import FLAGS, LINE_START, Record, is_written, leading_word, record
+from .jsonl import FLAGS, LINE_START, REBUILD, Record, is_written, leading_word, record
 from .known import kinds, kinds_called, known_as
 
 FIELDS = (
-    "word",
+    "key",
     "group",
     "notation",
     "legs",
@@ -27,24 +27,24 @@ FIELDS = (
     "base_motors",
     "driven",
     "fewest",
-    "see",
+    "sensors",
     "modes_bound",
 )
 """Fields of a record that have a column of their own."""
 COLUMNS: Mapping[str, str] = {
     **{name: f"json_extract(line, '$.{name}')" for name in FIELDS},
-    "drives": """iif(json_type(line, '$.refused') IS NULL, driven_kinds(json_extract(line, '$.word'),
+    "drives": """iif(json_type(line, '$.refused') IS NULL, driven_kinds(json_extract(line, '$.key'),
         json_extract(line, '$.choices'), json_extract(line, '$.dof')), NULL)""",
     "parallelograms": """iif(json_type(line, '$.refused') IS NULL,
-        max(instr(json_extract(line, '$.word'), 'Pi'), instr(json_extract(line, '$.word'), '2SS'),
-            instr(json_extract(line, '$.word'), '2US')) > 0, NULL)""",
-    "said": "said(line)",
+        max(instr(json_extract(line, '$.key'), 'Pi'), instr(json_extract(line, '$.key'), '2SS'),
+            instr(json_extract(line, '$.key'), '2US')) > 0, NULL)""",
+    "text_id": "text_id(line)",
 }
 """The columns of the table of records, and how each comes from a record's line. ``drives``: the kinds of driven joints;
-``parallelograms``: whether a leg has one, or two equal parallel rods; ``said``: the number of its text in the table of
-texts."""
+``parallelograms``: whether a leg has one, or two equal parallel rods; ``text_id``: the row of its text in the table
+``texts``."""
 BETWEEN = "\uffff"
-"""Between texts: no letter, so no text that is asked for has it."""
+"""Separator of texts, which no search text contains."""
 LONGEST_PATTERN = 50_000
 """Bytes of a pattern, above which SQLite takes none."""
 
@@ -54,18 +54,18 @@ LineTest = Callable[[str], bool]
 
 @dataclass(frozen=True)
 class RecordCondition:
-    """What is asked for by one name."""
+    """Criterion of one name."""
 
     where: str
     """In SQL, ``{0}`` for the value."""
     read: Callable[[Any], Any]
-    """The value as SQL is told it: None for one that none has. Raises ``BadRequest`` for one that none can have."""
+    """Converter of the value for SQL: None if no entry has it. Raises ``BadRequest`` for an impossible value."""
     hint: Callable[[Any], LineTest] | None = None
-    """Whether it may hold of a line as a build writes it, so that others are left out; None where all may fit."""
+    """Quick test of a line; None if all lines may fit."""
 
 
 def _same(value: Any) -> Any:
-    """A value that a field may have."""
+    """Return a value that a field may have, else None."""
     if isinstance(value, str):
         return None if re.search("[\ud800-\udfff]", value) else value
     fits = isinstance(value, float) or (isinstance(value, int) and abs(value) < 2**63)
@@ -75,7 +75,7 @@ def _same(value: Any) -> Any:
 def _letters(text: str) -> str:
     letters = sorted(set(text.split("+")))
     if not set(letters) <= set(MOVED):
-        raise BadRequest("the catalog cannot be asked for motors", text, f"{', '.join(MOVED)}, or several joined by +")
+        raise BadRequest("motors", text, MOVED, remedy="Join several by +.")
     return "+".join(letters)
 
 
@@ -86,12 +86,12 @@ def _pattern(text: str) -> str | None:
 
 
 def _folded(text: str) -> bytes | None:
-    """A text as it is sought."""
+    """Return a text as it is searched."""
     return None if BETWEEN in text else text.casefold().encode("utf-8", "surrogatepass")
 
 
 def _having(name: str, read: Callable[[Any], Any] = _same) -> RecordCondition:
-    """That a field has a value. 1 is also True, and 3 also 3.0, which are not so written."""
+    """Make the criterion that a field has a value; 1 equals True, and 3 equals 3.0, though written differently."""
     exact = (str, bool if name in FLAGS else int)
 
     def hint(value: Any) -> LineTest:
@@ -102,7 +102,7 @@ def _having(name: str, read: Callable[[Any], Any] = _same) -> RecordCondition:
 
 
 def _may_hold(sought: bytes | None) -> LineTest:
-    """Whether a text may stand in a line letter by letter, or is in a name of its robot."""
+    """Make the test that a text may occur in a line, or in a name of its robot."""
     text = (sought or b"").decode("utf-8", "surrogatepass")
     called = kinds_called(text)
     if not re.fullmatch(r"[a-z0-9*+!.{|}()-]+( +[a-z0-9*+!.{|}()-]+)*", text):
@@ -120,42 +120,42 @@ CONDITIONS: Mapping[str, RecordCondition] = {
     "motors": RecordCondition("drives = {0}", _letters),
     "parallelograms": RecordCondition("parallelograms = {0}", _same),
     "fewest": _having("fewest"),
-    "see": _having("see", lambda text: count_equal(sights(text))),
+    "sensor": _having("sensors", lambda text: count_equal(sights(text))),
     "modes": _having("modes_bound"),
     "legs": _having("legs", lambda number: _same(int(number))),
     "text": RecordCondition(
-        "(said IN (SELECT said FROM texts WHERE instr(text, {0})) OR instr(lower(word), {0}))", _folded, _may_hold
+        "(text_id IN (SELECT text_id FROM texts WHERE instr(text, {0})) OR instr(lower(key), {0}))", _folded, _may_hold
     ),
 }
-"""What can be asked for."""
+"""Criteria by name."""
 LEG_PATTERN = RecordCondition(
-    """(word GLOB {0} OR replace(word, '*', '') GLOB {0}
+    """(key GLOB {0} OR replace(key, '*', '') GLOB {0}
         OR notation IN (SELECT notation FROM chains WHERE chain GLOB {0}))""",
     _pattern,
 )
-"""The same for ``legs``, where that is no number."""
+"""Criterion ``legs`` with a pattern."""
 
 
 def require_askable(asked: Mapping[str, Any]) -> None:
-    """Raise ``BadRequest`` for a name that cannot be asked for."""
+    """Raise ``BadRequest`` for an unknown criterion."""
     for name in asked:
         if name not in CONDITIONS:
-            raise BadRequest("the catalog cannot be asked for", name, tuple(CONDITIONS))
+            raise BadRequest("unknown criterion", name, tuple(CONDITIONS))
 
 
 @dataclass(frozen=True)
 class RecordQuestion:
-    """All that is asked for and not None, as SQL with its values."""
+    """All given criteria as SQL with their values."""
 
     where: str
     values: Sequence[Any]
     hints: Sequence[LineTest]
-    """Of each value, whether its condition may hold of a line."""
+    """Quick tests of lines, one per value."""
 
     @classmethod
     def of(cls, *asked: tuple[str, Any]) -> RecordQuestion:
-        """Of several values in a tuple or list one has to be met. Raises ``BadRequest`` for a value that none can
-        have."""
+        """Combine criteria; of several values in a tuple or list one must fit. Raises ``BadRequest`` for an impossible
+        value."""
         clauses, values, hints = list[str](), list[Any](), list[LineTest]()
         for name, value in asked:
             terms = []
@@ -179,10 +179,10 @@ class RecordQuestion:
 
 
 def _condition(name: str, value: Any) -> tuple[RecordCondition, Any]:
-    """That of one value, and the value as it is told."""
-    of_texts = name in ("legs", "see", "text", "motors")
+    """Return the criterion of one value, and the value for SQL."""
+    of_texts = name in ("legs", "sensor", "text", "motors")
     if of_texts and not isinstance(value, str) and (name, type(value)) != ("legs", int):
-        raise BadRequest(f"the catalog cannot be asked for {name}", value, "a text, or a number of legs")
+        raise BadRequest(name, value, "an integer or a text" if name == "legs" else "a text")
     counted = name != "legs" or isinstance(value, int) or (value.isdecimal() and len(value) <= LONGEST_COUNT)
     condition = CONDITIONS[name] if counted else LEG_PATTERN
     return condition, condition.read(value)
@@ -191,7 +191,7 @@ def _condition(name: str, value: Any) -> tuple[RecordCondition, Any]:
 def _any_of(terms: Sequence[str]) -> str:
     """One of these; SQLite takes no deep nesting."""
     if len(terms) < 3:
-        return f"({' OR '.join(terms or ['word IS 0'])})"
+        return f"({' OR '.join(terms or ['key IS 0'])})"
     half = len(terms) // 2
     return f"({_any_of(terms[:half])} OR {_any_of(terms[half:])})"
 
@@ -207,11 +207,11 @@ def fill(
     texts: dict[bytes, int] = {}
     file.create_function("driven_kinds", 3, driven_kinds, deterministic=True)
     file.create_function("chains_of", 1, chains, deterministic=True)
-    file.create_function("said", 1, lambda line: texts.setdefault(_said(read(line)), len(texts)))
+    file.create_function("text_id", 1, lambda line: texts.setdefault(_said(read(line)), len(texts)))
     names = ", ".join(f'"{name}"' for name in columns)
     told = ", ".join(COLUMNS[name] for name in columns)
     file.execute(f"CREATE TABLE records (record INTEGER PRIMARY KEY, {names})")
-    file.execute("CREATE TABLE texts (said INTEGER PRIMARY KEY, text)")
+    file.execute("CREATE TABLE texts (text_id INTEGER PRIMARY KEY, text)")
     file.execute("CREATE TABLE chains (notation, chain)")
     try:
         file.executemany(
@@ -230,9 +230,8 @@ def fill(
 
 
 def places(lines: Sequence[str], asked: Mapping[str, Any], read: Callable[[str], Record]) -> Sequence[int]:
-    """Where among lines those of records are that fit: of those that may, one condition after the other, each of what
-    the ones before left. Records are read for texts alone; raises what ``read`` raises for lines that are no records,
-    where that is seen."""
+    """Return the indices of the lines that fit: quick tests first, then one criterion after the other. Entries are read
+    for texts only; raises what ``read`` raises for lines that are no entries."""
     questions = [RecordQuestion.of((name, asked[name])) for name in CONDITIONS if asked.get(name) is not None]
     hinted = [each.hints for each in questions if len(each.hints) == len(each.values)]
 
@@ -255,19 +254,19 @@ def _fitting(lines: Sequence[str], question: RecordQuestion, read: Callable[[str
             fill(memory, lines, question.columns(), read)
             return [row - 1 for row in question.rows(memory)]
     except sqlite3.Error as error:
-        raise BadRequest("not a record of the catalog", str(error)[:60]) from None
+        raise BadRequest("not a catalog entry", str(error)[:60], remedy=REBUILD) from None
 
 
 def _said(found: Record) -> bytes:
     """All texts of a record, with the names under which its robot is known; a word is sought apart, but for one with
     letters of which SQLite knows no small ones."""
-    values = [str(value) for name, value in found.items() if name != "word" or not value.isascii()]
+    values = [str(value) for name, value in found.items() if name != "key" or not value.isascii()]
     return BETWEEN.join([*values, known_as(found)]).casefold().encode("utf-8", "surrogatepass")
 
 
 def driven_kinds(word: str, choices: str | None, dof: int) -> str:
-    """The kinds of driven joints ("R", "P+R"), as a word marks them; of a published robot those of the first choice of
-    motors that determines all freedoms, or else of the first."""
+    """Return the kinds of actuated joints ("R", "P+R") marked in a key; of a published robot those of the first choice
+    of motors that determines all dof, else of the first choice."""
     listed = json.loads(choices or "[]")
     if not listed:
         return "+".join(sorted(set(re.findall(r"([RPCU])[a-z]*\*", word))))

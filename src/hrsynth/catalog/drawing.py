@@ -1,4 +1,4 @@
-"""A robot drawn as text: the chain of each leg from the base to the platform, with its motors and its watched link."""
+"""Drawing of a robot as text: the chain of each leg from base to platform, its motors and its observed link."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ ENDS = {
 }
 """On what the legs of each body end."""
 BETWEEN = {
-    "bar": "plate 1 and plate 2 are joined by a bar, the platform, and its parallel twin",
+    "bar": "plate 1 and plate 2 are joined by a bar, the platform, and a parallel bar",
     "slide": "the plate slides on the platform",
 }
 
 
 def drawing(word: ArchitectureKey) -> str:
-    """A line for all legs that are equal: ``*`` marks a motor, a double line the watched link."""
+    """Draw a line per kind of leg: ``*`` marks a motor, a double line the observed link."""
     watched = _observed_places(word)
     groups: dict[tuple[int, LegKey], list[int]] = {}
     number = 0
@@ -39,7 +39,7 @@ def drawing(word: ArchitectureKey) -> str:
         f"{head:<{width}}  {_chain(leg, watched.get(numbers[0]), ENDS[word.platform][body])}"
         for head, ((body, leg), numbers) in zip(heads, groups.items(), strict=True)
     ]
-    seen = [f"seen of the platform: {count_equal(word.seen)}"] if word.seen else []
+    seen = [f"sensors: {count_equal(word.seen)}"] if word.seen else []
     return "\n".join([*lines, *([BETWEEN[word.platform]] if word.platform in BETWEEN else []), *seen])
 
 
@@ -56,7 +56,7 @@ def _chain(leg: LegKey, watched: int | None, end: str) -> str:
 
 
 def _line(leg: LegKey, place: int, watched: int | None) -> str:
-    """The link before a joint: double if it is the watched one, and on both sides of a composite whose rod is."""
+    """The link before a joint: double if observed, and on both sides of a composite with an observed rod."""
     if watched is None:
         return "──"
     inside = leg.joints[watched].letter in COMPOSITE

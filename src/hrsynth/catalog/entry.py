@@ -1,4 +1,4 @@
-"""The record of an architecture: what its hidden robot is, what it sees, exactly and at closed configurations."""
+"""Entry of an architecture: its hidden robot and verdict, exact and confirmed at samples."""
 
 from __future__ import annotations
 
@@ -52,12 +52,12 @@ OTHERS = 3
 
 
 def entry(text: str) -> dict[str, Any]:
-    """The record of a word: its verdict, exact and confirmed at closed configurations, or why there is none.
+    """Compute the entry of a key: its verdict, exact and confirmed at samples, or the reason of refusal.
 
-    The same for the same word, whatever was asked before. Raises ``BadRequest`` for a text that is no word.
+    It depends on the key alone. Raises ``BadRequest`` for a text that is not a key.
     """
     word = parse(text)
-    record: dict[str, Any] = {"word": str(word), "group": group(word), "see": count_equal(word.seen) or None}
+    record: dict[str, Any] = {"key": str(word), "group": group(word), "sensors": count_equal(word.seen) or None}
     found = _study_first(str(model(word)))
     if isinstance(found, str):
         return {**record, "refused": found}
@@ -86,7 +86,7 @@ def _links(text: str) -> frozenset[str]:
 
 @dataclass(frozen=True, eq=False)
 class ArchitectureStudy:
-    """What the architectures of one model have in common, whatever is driven."""
+    """Facts that do not depend on the motors, for all architectures of one model."""
 
     facts: dict[str, Any]
     attempt: int
@@ -95,7 +95,7 @@ class ArchitectureStudy:
     """The joint of each observation of ``encoders``."""
 
     def motor_rank(self, names: Sequence[str]) -> int:
-        """What motors on these joints see of the platform."""
+        """Return the rank of motors on these joints: the platform dof that they determine."""
         return select_relation(self.encoders, [i for i, name in enumerate(self.joints) if name in names]).rank
 
     def record(self, drawn: Mechanism, motors: Sequence[str]) -> dict[str, Any]:
@@ -132,9 +132,8 @@ def _study(word: ArchitectureKey, attempt: int) -> ArchitectureStudy:
 def study(
     drawn: Mechanism, sets: Callable[[int], Iterable[tuple[int, ...]]], attempt: int = 0, *, proved: bool = True
 ) -> ArchitectureStudy:
-    """What is said of a mechanism whatever is driven. ``sets`` gives the sets of so many legs, by their places, of
-    which some may be equal but for the names of legs: the first of these. Raises ``NotConfirmed`` where the verdict is
-    not exact, unless it need not be ``proved``.
+    """Study a mechanism regardless of motors. ``sets`` gives the sets of a number of legs (indices), one of those
+    equal by symmetry. Raises ``NotConfirmed`` if the verdict is not exact, unless ``proved`` is False.
     """
     setup = observe(drawn, samples=SAMPLES)
     if not setup.dof:
@@ -151,13 +150,13 @@ def study(
         "dof": setup.dof,
         "motion": _motion(setup),
         "mobility": setup.mobility.total,
-        "idle": setup.mobility.internal,
+        "internal": setup.mobility.internal,
         "verdict": derivation.verdict.verdict,
         "rank": derivation.verdict.rank,
         "exact": derivation.exact.exact,
         "instances": derivation.exact.instances,
         "confirmed": len(setup.configurations),
-        "lost": [_general(freedom.name) for freedom in derivation.verdict.unobserved],
+        "unobserved": [_general(freedom.name) for freedom in derivation.verdict.unobserved],
         "minimal": [list(each) for each in fewest],
         "fewest": len(fewest[0]) if fewest else 0,
         "condition": None,
@@ -165,12 +164,12 @@ def study(
         "modes_bound": None,
         "modes_seen": None,
         "modes_proof": None,
-        "cure": None,
+        "suggestion": None,
     }
     if derivation.verdict.verdict == CONTROLLABLE:
         facts.update(_singular(setup), **_modes(setup, fewest))
     else:
-        facts["cure"] = _cure(advise(setup, most=1))
+        facts["suggestion"] = _cure(advise(setup, most=1))
     return ArchitectureStudy(facts, attempt, *_encoders(setup))
 
 
@@ -192,7 +191,7 @@ def smallest_sets(record: Mapping[str, Any], drawn: Mechanism) -> list[dict[str,
         if legs == record.get("modes_legs"):
             with suppress(HrsynthError):
                 near = len(modes(_observing(setup, legs)).near_modes)
-        found.append({"legs": list(legs), "hidden": hidden, "problem": problem, "near": near})
+        found.append({"legs": list(legs), "hidden": hidden, "problem": problem, "near_matches": near})
     return found
 
 
@@ -204,8 +203,8 @@ def _agree(exact: ExactArchitecture, samples: Samples, found: Verdict) -> None:
     if generic.rank != found.rank:
         raise NotConfirmed(
             exact.mechanism.name,
-            f"legs {', '.join(found.legs)} see {generic.rank} of {found.dof} "
-            f"freedoms in exact arithmetic, {found.rank} at samples",
+            f"legs {', '.join(found.legs)}: rank {generic.rank} of {found.dof} "
+            f"in exact arithmetic, {found.rank} at samples",
         )
 
 
@@ -220,7 +219,7 @@ def _observing(setup: ObservedRobot, legs: Sequence[str]) -> ObservedRobot:
 
 
 def _kinds(word: ArchitectureKey) -> list[str]:
-    """What each leg is, in the order of the labels: equal legs of one body can be exchanged; or what is seen."""
+    """Return the kind of each leg in the order of labels, or the sensors; equal legs of one link can be exchanged."""
     return [str(each) for each in word.seen] or [
         f"{body}{leg}" for body, legs in enumerate(word.bodies) for leg in legs
     ]
@@ -232,8 +231,8 @@ def _smallest(
     sets: Callable[[int], Iterable[tuple[int, ...]]],
     best: Verdict,
 ) -> list[tuple[str, ...]]:
-    """The smallest sets of legs that see as much as all together, one of those that differ by equal legs; each rank
-    confirmed, and exact where that is asked for."""
+    """Return the smallest sets of legs with the rank of all legs, one of those that differ by equal legs; each rank is
+    confirmed, and exact if ``exact`` is given."""
     if not best.rank:
         return []
     for size in range(1, len(_watch(setup)) + 1):
@@ -262,7 +261,7 @@ def _choices(kinds: Sequence[str], size: int) -> Iterator[tuple[int, ...]]:
 
 
 def _steps(steps: Sequence[Step]) -> list[str]:
-    """The rules that were applied, in order, each with the legs to which it was in a row: "takeover 1,2,3"."""
+    """The rules that were applied, in order, each with its legs: "lift 1,2,3"."""
     taken = [(step.rule, step.leg) for step in steps if step.accepted]
     return [
         " ".join([rule, ",".join(str(leg) for _, leg in part if leg)]).strip()
@@ -278,13 +277,13 @@ def _motion(setup: ObservedRobot) -> str:
 
 
 def _general(name: str) -> str:
-    """A freedom's name without the dimensions of this one mechanism."""
+    """Return the name of a twist without the dimensions of the mechanism."""
     name = re.sub(r" \(with the platform at .*\)", "", name)
     return re.split(r" of pitch| (?:along|about the line through|about) \(", name)[0]
 
 
 def _singular(setup: ObservedRobot) -> dict[str, Any]:
-    """When the hidden robot loses a freedom, in words; None where that is not known in words."""
+    """Return the Type 2 condition in words, None if there is none."""
     return {"condition": MeasuredRobot.of_directions(setup).condition.words}
 
 
@@ -332,7 +331,7 @@ def _lists(measured: MeasuredRobot, configurations: Sequence[ClosedConfiguration
 
 
 def _cure(found: Advice) -> str:
-    """The first of the smallest sets of further measurements that see what is lost."""
+    """Return the first of the smallest sets of further measurements that observe the unobserved twists."""
     if not found.sets:
         return "none of up to four measurements"
     first = " and ".join(
@@ -342,7 +341,7 @@ def _cure(found: Advice) -> str:
 
 
 def _encoders(setup: ObservedRobot) -> tuple[VelocityRelation, tuple[str, ...]]:
-    """What encoders on all joints see at a configuration, and the joint of each."""
+    """Return the velocity relation of encoders on all joints at a configuration, and the joint of each."""
     every = [
         (joint.name, each) for joint in setup.mechanism.joints.values() for each in encoders(setup.mechanism, joint, "")
     ]

@@ -1,4 +1,4 @@
-"""Who makes the records: this process, several on this machine, or a cluster. Parts come back in any order."""
+"""Executors of a build: this process, several on this machine, or a cluster. Parts return in any order."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def executor(workers: int = 1, cluster: str | None = None) -> Executor:
     """The executor of a number of processes, or of the cluster at an address; raises ``MissingExtra`` and
     ``BadRequest``."""
     if workers < 1:
-        raise BadRequest("number of workers", workers, "1 or more")
+        raise BadRequest("--workers", workers, "at least 1")
     if cluster is not None:
         if workers > 1:
             raise BadRequest("workers and a cluster", workers, "one of the two")
@@ -69,7 +69,9 @@ def _run_on_cluster(task: Task, parts: Iterable[list[str]], address: str) -> Ite
     try:
         client = Client(address, timeout=PATIENCE, set_as_default=False)
     except (ValueError, TypeError) as error:
-        raise BadRequest("address of a cluster", address, f"such as tcp://host:8786 ({error})") from None
+        raise BadRequest(
+            f"--cluster {address}: not an address: {error}", remedy="Write it as tcp://host:8786."
+        ) from None
     except (OSError, ImportError):
         raise Stopped(f"no cluster answers at {address} within {PATIENCE:g} s") from None
     try:
@@ -91,12 +93,12 @@ def _serve_parts(client: Any, task: Task, parts: Iterator[list[str]]) -> Iterato
             for future in done:
                 yield _result(future)
     except (OSError, CancelledError, FutureCancelled):
-        raise Stopped("the cluster is gone") from None
+        raise Stopped("the cluster does not answer") from None
 
 
 def _submit(client: Any, task: Task, parts: Iterable[list[str]]) -> set[Any]:
     if client.status != "running":
-        raise Stopped("the cluster is gone")
+        raise Stopped("the cluster does not answer")
     return {client.submit(_with_version, task, part, pure=False) for part in parts}
 
 
@@ -114,13 +116,13 @@ def _wait_for_parts(client: Any, waiting: set[Any]) -> tuple[set[Any], set[Any]]
 
 
 def _result(future: Any) -> Made:
-    """What a part gave; what is neither our own ``Stopped`` nor a lost line is wrong with the cluster's workers."""
+    """Return the result of a part; other errors than ``Stopped`` and lost connections are those of the workers."""
     from concurrent.futures import CancelledError
 
     from distributed.scheduler import KilledWorker
 
     if future.cancelled():
-        raise Stopped("the cluster is gone")
+        raise Stopped("the cluster does not answer")
     try:
         version, found = future.result()
     except (Stopped, OSError, CancelledError):
@@ -128,11 +130,9 @@ def _result(future: Any) -> Made:
     except KilledWorker:
         raise Stopped("the cluster's workers died one after the other on the same words") from None
     except Exception as error:
-        raise Stopped(
-            f"the cluster cannot do the work, needed there: hrsynth {__version__} ({str(error).splitlines()[0]})"
-        ) from None
+        raise Stopped(f"the cluster's workers need hrsynth {__version__}: {str(error).splitlines()[0]}") from None
     if version != __version__:
-        raise Stopped(f"a worker of the cluster has hrsynth {version}, needed: {__version__}")
+        raise Stopped(f"a worker of the cluster has hrsynth {version}, not {__version__}")
     return list(found)
 
 
@@ -141,11 +141,11 @@ def _require_alive(client: Any) -> None:
     try:
         workers = client.nthreads()
     except (RuntimeError, ValueError):
-        raise Stopped("the cluster is gone") from None
+        raise Stopped("the cluster does not answer") from None
     if not workers:
         raise Stopped("the cluster has no workers left")
 
 
 def _with_version(task: Task, part: list[str]) -> tuple[str, Made]:
-    """What a part gives, and the version that made it."""
+    """Run a part; return its result with the version."""
     return __version__, task(part)

@@ -1,7 +1,7 @@
-"""The mechanism that a word stands for: generic dimensions drawn from the word itself, so that it is always the same.
+"""Mechanism of a key: generic dimensions drawn from the key itself, so that it is always the same.
 
-Feet stand on a ring, tips on a smaller one (planar robots: in one plane); the centres between lie anywhere near. No
-dimension is special but what the word says, so a mechanism that moves moves because of its architecture.
+Legs start on a ring of the base and end on a smaller one (planar robots: in one plane); the centres between are random.
+Only the key makes a dimension special, so a mechanism that moves does so because of its architecture.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def mechanism(word: ArchitectureKey, attempt: int = 0) -> Mechanism:
 
 
 def _with_sights(drawn: Mechanism, word: ArchitectureKey, attempt: int) -> Mechanism:
-    """The mechanism with what the word says to be seen of its platform: places, axes and cameras in general position.
+    """Add the sensors of a key: points, axes and cameras in general position.
 
     The cameras see upwards from below the platform.
     """
@@ -71,7 +71,7 @@ def _with_sights(drawn: Mechanism, word: ArchitectureKey, attempt: int) -> Mecha
 
 
 def planar(word: ArchitectureKey) -> bool:
-    """Whether all that a word's legs do, they do in the plane normal to z."""
+    """Return True if all joints of a key move in the plane normal to z."""
     return all(_in_plane(joint) for leg in word.legs for joint in leg.joints)
 
 
@@ -110,7 +110,7 @@ class _Draft:
         return _with_segments(self.builder.build(platform="platform"), self.word, watched)
 
     def _platform(self) -> tuple[str, ...]:
-        """Adds the platform and says on which links legs end."""
+        """Add the platform; return the links on which legs end."""
         b = self.builder
         match self.word.platform:
             case "bar":
@@ -166,7 +166,7 @@ def _with_segments(drawn: Mechanism, word: ArchitectureKey, chords: Mapping[str,
 
 
 class _Limb:
-    """A leg in the making: its centres from the foot to the tip, then its joints."""
+    """Builder of a leg: its centres from base to platform, then its joints."""
 
     def __init__(self, draft: _Draft, leg: LegKey, number: int, angle: float, end: str) -> None:
         self.draft, self.leg, self.number, self.end, self.rng = draft, leg, number, end, draft.rng
@@ -221,7 +221,7 @@ class _Limb:
         watched[str(k)] = marked
 
     def _centres(self) -> tuple[list[Array], list[Array]]:
-        """Where each joint starts and ends (one point but for composites), from the foot to the tip."""
+        """Return start and end of each joint (one point except for composites), from base to platform."""
         joints = self.leg.joints
         gaps = len(joints) - 1 + sum(joint.letter in COMPOSITE for joint in joints)
         along = self.tip - self.foot
@@ -267,7 +267,9 @@ class _Limb:
         names = joint.axes
         known = {name: unit(line) if name == "l" else self._vector(name, at) for name in names if name not in "nq"}
         if not known:
-            raise BadRequest(f"word {str(self.draft.word)!r}: axes of a U", names, "one that is named by itself")
+            raise BadRequest(
+                f"key {str(self.draft.word)!r}: axes of a U", names, remedy="Name one of them other than n or q."
+            )
         found = []
         for name, other in zip(names, reversed(names), strict=True):
             if name == "n":
@@ -278,9 +280,8 @@ class _Limb:
                 found.append(known[name])
         if abs(found[0] @ found[1]) > SQUARE_AXES:
             raise BadRequest(
-                f"word {str(self.draft.word)!r}: the axes of U{names} are not at right angles",
-                round(float(found[0] @ found[1]), 6),
-                "n or q for one of them",
+                f"key {str(self.draft.word)!r}: the axes of U{names} are not at right angles",
+                remedy="Use n or q for one of them.",
             )
         return found
 

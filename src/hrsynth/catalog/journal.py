@@ -1,4 +1,4 @@
-"""The journal of a build: every record on the disk as soon as it is there, and a build goes on where it was killed."""
+"""Journal of a build: each entry is on the disk as soon as it is computed, so that a killed build continues."""
 
 from __future__ import annotations
 
@@ -27,7 +27,9 @@ class Journal:
         try:
             self._file = open_kept(path, os.O_RDWR | os.O_APPEND)
         except OSError as error:
-            raise BadRequest(f"cannot write the journal: {error.strerror}", str(path)) from None
+            raise BadRequest(
+                f"{path}: cannot write the journal: {error.strerror}", remedy="Choose another path."
+            ) from None
         try:
             require_alone(self._file, "another build is writing this journal", path)
             if anew:
@@ -69,7 +71,7 @@ class Journal:
         self.path.unlink(missing_ok=True)
 
     def _read(self, group: str) -> dict[str, tuple[int, int]]:
-        """Where the line of each word starts, and its length."""
+        """Return start and length of the line of each key."""
         places: dict[str, tuple[int, int]] = {}
         self._end = 0
         with os.fdopen(os.dup(self._file), "rb") as content:
@@ -81,11 +83,10 @@ class Journal:
                 if self._end == 0:
                     if text is None:
                         raise BadRequest(
-                            "a journal without checksums (of an older version) or with a damaged first line",
-                            str(self.path),
-                            "that file removed, or --anew",
+                            f"{self.path}: journal without checksums or with a damaged first line",
+                            remedy="Remove the file or use --anew.",
                         )
-                    read_head(text, str(self.path), "not the journal of a build", str(self.path))
+                    read_head(text, str(self.path), f"{self.path}: not the journal of a build", None)
                 elif text is not None:
                     with contextlib.suppress(BadRequest):
                         places[word_of(text)] = self._end, len(text)

@@ -1,4 +1,4 @@
-"""Records as lines: a head that says what they are, then a line of JSON each, as short as it can be and ASCII."""
+"""Entries as lines: a head with versions and group, then a line of compact ASCII JSON per entry."""
 
 from __future__ import annotations
 
@@ -12,17 +12,19 @@ from ..errors import BadRequest
 from .architecture_key import VERSION
 
 Record = Mapping[str, Any]
-"""What the catalog says of one architecture; a field that is missing is not known or does not apply."""
+"""Entry of one architecture; a missing field is unknown or does not apply."""
 
 CHECKSUM = "crc32"
 """What the head of a file that is not packed calls the checksum of all lines behind it."""
-LINE_START, _GROUP = '{"word":"', '","group":"'
+LINE_START, _GROUP = '{"key":"', '","group":"'
 
-FORMAT = 1
+FORMAT = 2
 """Version of the lines and the journal."""
+REBUILD = "Build it again with hrsynth catalog build."
+"""Remedy for a file that is damaged or of another version."""
 
 TEXTS = (
-    "word",
+    "key",
     "group",
     "notation",
     "hidden",
@@ -30,15 +32,15 @@ TEXTS = (
     "verdict",
     "condition",
     "modes_proof",
-    "cure",
-    "see",
+    "suggestion",
+    "sensors",
     "refused",
 )
 COUNTS = (
     "legs",
     "dof",
     "mobility",
-    "idle",
+    "internal",
     "rank",
     "instances",
     "confirmed",
@@ -50,7 +52,7 @@ COUNTS = (
     "modes_seen",
 )
 FLAGS = ("exact", "driven", "base_motors")
-LISTS = ("lost", "steps", "modes_legs")
+LISTS = ("unobserved", "steps", "modes_legs")
 """Fields of a record by the kind of their values: texts, whole numbers, true or false, lists of texts."""
 NEEDED = (
     "notation",
@@ -59,7 +61,7 @@ NEEDED = (
     "legs",
     "dof",
     "mobility",
-    "idle",
+    "internal",
     "rank",
     "instances",
     "fewest",
@@ -71,30 +73,30 @@ NEEDED = (
 
 
 def line(entry: Record) -> str:
-    """A record as one line without its end: ``word`` and ``group`` first, then fields by name, none that is None."""
-    first = {name: entry[name] for name in ("word", "group")}
+    """A record as one line without its end: ``key`` and ``group`` first, then fields by name, none that is None."""
+    first = {name: entry[name] for name in ("key", "group")}
     rest = {name: entry[name] for name in sorted(entry) if name not in first and entry[name] is not None}
     return json.dumps(first | rest, separators=(",", ":"), allow_nan=False)
 
 
 def head(group: str, **more: object) -> str:
-    """The first line of a file, or of a journal, which says no more than this."""
+    """Return the first line of a file or journal."""
     return json.dumps({"format": FORMAT, "catalog": VERSION, "group": group, **more}, separators=(",", ":"))
 
 
 def read_head(text: str | bytes, file: str, otherwise: str, value: str | None, *needed: str) -> Mapping[str, Any]:
-    """What a file's first line says; raises ``BadRequest`` for another version, and in these words for no head."""
+    """Read a file's first line; raises ``BadRequest`` for another version or no head."""
     try:
         known = _loads(text)
         versions, *_ = (known["format"], known["catalog"]), *(known[name] for name in needed)
     except (ValueError, TypeError, KeyError):
-        raise BadRequest(f"{otherwise}: its first line is not a header", value) from None
+        raise BadRequest(f"{otherwise}: its first line is not a header", value, remedy=REBUILD) from None
     require_version(versions, file)
     return dict(known)
 
 
 def _loads(text: str | bytes) -> Any:
-    """What a line holds; raises ``ValueError`` also for one that is too long or nested too deeply."""
+    """Parse a line; raises ``ValueError`` also for one that is too long or nested too deeply."""
     if len(text) > LARGEST_RECORD:
         raise ValueError("too long")
     try:
@@ -108,22 +110,22 @@ def record(text: str, file: str | None = None) -> Record:
     the file, where it is none."""
     try:
         found = _loads(text)
-        wrong = _wrong_field(found) if isinstance(found, dict) else "an object of JSON with a word"
+        wrong = _wrong_field(found) if isinstance(found, dict) else "a JSON object with a key"
     except ValueError:
-        wrong = "an object of JSON with a word"
+        wrong = "a JSON object with a key"
     if wrong:
         raise BadRequest(
-            "not a record of the catalog" if file is None else f"{file}: not a record of the catalog", text[:60], wrong
+            "not a catalog entry" if file is None else f"{file}: not a catalog entry", text[:60], wrong, remedy=REBUILD
         )
     return dict(found)
 
 
 def _wrong_field(found: dict[str, Any]) -> str:
-    """What a record lacks; nothing where it is whole."""
-    for name in ("word", "group", *(() if "refused" in found else NEEDED)):
+    """Return the first defect of an entry, empty if there is none."""
+    for name in ("key", "group", *(() if "refused" in found else NEEDED)):
         if name not in found:
-            return f"an object of JSON with a {name}"
-    for names, kind, said in ((TEXTS, str, "a text"), (COUNTS, int, "a whole number"), (FLAGS, bool, "true or false")):
+            return f"a JSON object with a {name}"
+    for names, kind, said in ((TEXTS, str, "a text"), (COUNTS, int, "an integer"), (FLAGS, bool, "true or false")):
         for name in names:
             if name in found and type(found[name]) is not kind:
                 return f"{name}: {said}"
@@ -138,12 +140,12 @@ def _wrong_field(found: dict[str, Any]) -> str:
         if isinstance(found[name], list | dict):
             return f"{name[:60]}: no list and no object"
     if "modes_bound" in found and "modes_seen" not in found:
-        return "modes_seen beside modes_bound"
+        return "modes_seen with modes_bound"
     return ""
 
 
 def _are(values: Any, kind: type) -> bool:
-    """Whether this is a list of values of a kind."""
+    """Return True for a list of values of a kind."""
     return type(values) is list and all(type(each) is kind for each in values)
 
 
@@ -160,11 +162,11 @@ def _is_choice(each: dict[str, Any]) -> bool:
 
 def word_of(text: str, file: str | None = None) -> str:
     """The word of a record's line."""
-    return str(record(text, file)["word"])
+    return str(record(text, file)["key"])
 
 
 def is_written(text: str) -> bool:
-    """Whether a line is as :func:`line` writes it, and what it says stands in it letter by letter."""
+    """Return True if a line has the form of :func:`line`, without escapes."""
     return text.startswith(LINE_START) and _GROUP in text and '": ' not in text and "\\u" not in text
 
 
@@ -188,14 +190,14 @@ def _checksum(content: bytes) -> str:
 
 
 def head_count(first: bytes, file: str) -> int:
-    """The number of records that a file's first line says; raises ``BadRequest`` where it says none."""
+    """Return the number of entries in a file's first line; raises ``BadRequest`` without one."""
     return int(_read_count(first, file)["count"])
 
 
 def _read_count(first: bytes, file: str) -> Mapping[str, Any]:
     told = read_head(first, file, f"{file}: not a catalog file", None, "count")
     if type(told["count"]) is not int:
-        raise BadRequest(f"{file}: number of records", told["count"], "a whole number")
+        raise BadRequest(f"{file}: number of entries", told["count"], "an integer", remedy=REBUILD)
     return told
 
 
@@ -205,9 +207,9 @@ def decode_lines(content: bytes, file: str) -> list[str]:
     first, _, rest = content.partition(b"\n")
     told, found = _read_count(first, file), rest.count(b"\n")
     if CHECKSUM in told and told[CHECKSUM] != (crc := _checksum(rest)) and found >= told["count"]:
-        raise BadRequest(f"{file}: damaged, checksum", crc, f"{told[CHECKSUM]}; build it again")
+        raise BadRequest(f"{file}: damaged, checksum", crc, str(told[CHECKSUM]), remedy=REBUILD)
     if found != told["count"] or not content.endswith(b"\n"):
-        raise BadRequest(f"{file}: truncated, records", found, str(told["count"]))
+        raise BadRequest(f"{file}: truncated, entries", found, str(told["count"]), remedy=REBUILD)
     return rest.decode("ascii", "replace").split("\n")[:-1]
 
 
@@ -216,6 +218,7 @@ def require_version(found: tuple[object, object], file: str, wanted: int = FORMA
     if found != (wanted, VERSION):
         raise BadRequest(
             f"{file}: a catalog of another version",
-            "format {}, words {}".format(*found),
-            f"format {wanted}, words {VERSION}; build it again",
+            "format {}, keys {}".format(*found),
+            f"format {wanted}, keys {VERSION}",
+            remedy=REBUILD,
         )

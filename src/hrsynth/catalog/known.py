@@ -14,7 +14,7 @@ from .jsonl import Record
 
 @cache
 def aliases() -> dict[str, str]:
-    """Names by word, without motors and marks of watched links."""
+    """Return names by key, without motors and marks of observed links."""
     text = resources.files("hrsynth.catalog").joinpath("aliases.toml").read_text(encoding="utf-8")
     return {word: each["names"] for each in tomllib.loads(text)["robot"] for word in each["words"]}
 
@@ -32,36 +32,36 @@ def kinds_called(text: str) -> frozenset[frozenset[str]]:
 
 
 def kinds(word: str) -> frozenset[str]:
-    """The legs of a word, without motors and marks of watched links, each once."""
+    """Return the legs of a key, without motors and marks of observed links, each once."""
     return frozenset(re.findall(r"\(([^()]*)\)", re.sub("[*!]", "", word)))
 
 
 def equal_legs(word: str) -> bool:
-    """Whether all legs of a word are of one chain, whatever is driven or observed."""
+    """Return True if all legs of a key have one chain, regardless of motors and observed links."""
     return len(kinds(word)) < 2
 
 
 def is_called(record: Record, text: str) -> bool:
-    """Whether a text occurs in a name under which a record's robot is known; words with other legs are not read."""
+    """Return True if a text occurs in a name of an entry's robot; keys with other legs are not parsed."""
     found = kinds_called(text)
-    return bool(found) and kinds(record["word"]) in found and text.casefold() in known_as(record).casefold()
+    return bool(found) and kinds(record["key"]) in found and text.casefold() in known_as(record).casefold()
 
 
 def known_as(record: Record) -> str:
     """The names under which a record's robot is known; words with legs that no known robot has are not read."""
-    word = record["word"]
+    word = record["key"]
     return (alias(word) or "") if kinds(word) in kinds_called("") else ""
 
 
 def bare(word: str) -> str:
-    """A word without motors and marks of watched links."""
+    """Return a key without motors and marks of observed links."""
     return str(parse(word).unmoved.unmarked)
 
 
 def order(record: Record) -> tuple[bool, bool, bool, bool, bool, bool]:
-    """The place of a record in the list, smaller first: known by a name, with an answer, all legs equal, every default
-    link watched, all motors on the base, controllable."""
-    word = record["word"]
+    """The place of a record in the list, smaller first: known by a name, with a verdict, all legs equal, every default
+    link observed, all motors on the base, controllable."""
+    word = record["key"]
     legs = len(set(parse(word).legs))
     return (
         alias(word) is None,

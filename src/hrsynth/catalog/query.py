@@ -1,4 +1,4 @@
-"""Asking the catalog: all records of a store, by word, or those that fit what is asked for."""
+"""Queries of the catalog: entries by key, or those that fit criteria."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .store import DATABASES, ShippedCatalogs, Store, shipped_folder, store
 
 
 class ReadRecords(Sequence[Record]):
-    """The records of lines, each read when it is looked at first."""
+    """Entries of lines, each parsed at first access."""
 
     def __init__(self, lines: Sequence[str], source: str | None = None) -> None:
         self._lines, self._source = lines, source
@@ -33,12 +33,12 @@ class ReadRecords(Sequence[Record]):
         return len(self._lines)
 
     def fitting(self, asked: Mapping[str, Any]) -> ReadRecords:
-        """Those that fit what is asked for."""
+        """Return the entries that fit criteria."""
         found = places(self._lines, asked, partial(record, file=self._source))
         return ReadRecords([self._lines[i] for i in found], self._source)
 
     def words(self) -> list[str]:
-        """The words of all, none of which is read for that."""
+        """Return the keys of all entries without parsing them."""
         return [leading_word(each, self._source) for each in self._lines]
 
     def __getitem__(self, place: Any) -> Any:
@@ -50,9 +50,8 @@ class ReadRecords(Sequence[Record]):
             self._parts += 3 + sum(map(line.count, "[{,"))
             if self._parts > MOST_READ_PARTS:
                 raise BadRequest(
-                    f"{self._source or 'catalog'}: records with more than {MOST_READ_PARTS} parts",
-                    None,
-                    "fewer records, or smaller ones",
+                    f"{self._source or 'catalog'}: more than {MOST_READ_PARTS} JSON values",
+                    remedy="Restrict the search, for example by group.",
                 )
             found = self._read[place] = record(line, self._source)
         return found
@@ -60,7 +59,7 @@ class ReadRecords(Sequence[Record]):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Catalog(Value):
-    """Records, by group and then by word."""
+    """Entries of architectures, by group and then by key."""
 
     records: Sequence[Record]
 
@@ -74,24 +73,41 @@ class Catalog(Value):
         return word in self._places
 
     def __getitem__(self, word: str) -> Record:
-        """The record of an architecture, its word spelt in any way; raises ``BadRequest`` with words close to it."""
+        """Return the entry of a key in any spelling; raises ``BadRequest`` with similar keys."""
         name = word if word in self._places else str(parse(word))
         if name not in self._places:
             close = difflib.get_close_matches(name, self._places, n=3, cutoff=0.4)
-            raise BadRequest("not in the catalog", name, f"{', '.join(close)} …" if close else None)
+            raise BadRequest(f"key {name}: not in the catalog", remedy=f"Use {' or '.join(close)}." if close else "")
         return self.records[self._places[name]]
 
     def where(self, **asked: Any) -> Catalog:
-        """The records that fit all given criteria (those that are not None); raises ``BadRequest`` for unknown ones.
+        """Return the entries that fit all given criteria.
 
-        ``group``, ``dof``, ``motion`` ("3T", "2T1R"), ``verdict``, ``base_motors``, ``fewest`` (legs of the smallest
-        set that sees all that can be seen), ``modes`` (complex ones of such a set) and ``sensor`` ("3point": what is
-        seen of the platform instead of legs) must be equal. ``legs`` is their number, or a pattern of ``*`` and ``?``
-        for the notation or for the chain of one leg, with or without motor marks. ``motors`` ("R", "P", "P+R" …) are
-        the kinds of all driven joints, and ``driven`` says whether the motors determine all freedoms; of a published
-        robot its first choice of motors that does counts. ``parallelograms``: whether a leg has one, or two equal rods.
-        ``text`` must occur in some field, or in a name under which the robot is known. Several values in a tuple: any
-        of them."""
+        Parameters
+        ----------
+        **asked
+            Criteria; of several values in a tuple one must fit, None is ignored. Equal to a field: ``group``, ``dof``,
+            ``motion`` ("3T", "2T1R"), ``verdict``, ``base_motors``, ``fewest`` (size of the smallest set of legs with
+            the largest rank), ``modes`` (complex ones of such a set), ``driven`` (the motors determine all dof),
+            ``sensor`` ("3point": observations of the platform instead of legs). ``legs``: their number, or a pattern of
+            ``*`` and ``?`` for the notation or the chain of one leg. ``motors``: kinds of all actuated joints ("R",
+            "P+R"). ``parallelograms``: True if a leg has one, or two equal rods. ``text``: part of a field or name.
+
+        Returns
+        -------
+        Catalog
+            The entries that fit, in the same order.
+
+        Raises
+        ------
+        BadRequest
+            For an unknown criterion or an impossible value.
+
+        Examples
+        --------
+        >>> len(hrsynth.catalog.load(group="schoenflies").where(verdict="controllable", fewest=2))
+        15
+        """
         require_askable(asked)
         if isinstance(self.records, ReadRecords):
             return Catalog(self.records.fitting(asked))
@@ -100,19 +116,19 @@ class Catalog(Value):
 
     @property
     def words(self) -> list[str]:
-        """The words of all records, which are not read for that."""
+        """Keys of all entries."""
         return (
             self.records.words()
             if isinstance(self.records, ReadRecords)
-            else [str(each["word"]) for each in self.records]
+            else [str(each["key"]) for each in self.records]
         )
 
     def values(self, name: str) -> list[Any]:
-        """The values of a field that records have, sorted."""
+        """Return the values of a field, sorted."""
         return sorted(value for (value,) in self.count(name) if value is not None)
 
     def count(self, *fields: str) -> dict[tuple[Any, ...], int]:
-        """How many records have which values of the fields, sorted by these; None where a record has no such field."""
+        """Count the entries by the values of fields, sorted; None for a missing field."""
         counts = Counter(tuple(each.get(name) for name in fields) for each in self.records)
         return dict(sorted(counts.items(), key=lambda item: [(value is None, str(value)) for value in item[0]]))
 
@@ -122,12 +138,36 @@ class Catalog(Value):
 
 
 def load(path: str | Path | None = None, **asked: Any) -> Catalog:
-    """The shipped catalog, or that of a folder or SQLite file; ``published``: the shipped one of published robots
-    (studies/parroblib); ``all``: both. ``asked`` as for ``Catalog.where``.
+    """Load a catalog of architectures.
 
-    What is seen of platforms instead of legs (the group ``sensors``) is left out unless ``group`` or ``sensor`` asks
-    for it. Of a SQLite file only the records that fit are read. Raises ``BadRequest`` if there is no catalog, or one of
-    another version."""
+    Parameters
+    ----------
+    path : str or Path, optional
+        Folder or SQLite file; ``published``: the shipped catalog of published robots; ``all``: this and the shipped one
+        of architectures, which is the default.
+    **asked
+        Criteria of :meth:`Catalog.where`.
+
+    Returns
+    -------
+    Catalog
+        Entries by key, as mappings. Keys with sensors (group ``sensors``) are left out unless ``group`` or ``sensor``
+        selects them.
+
+    Raises
+    ------
+    BadRequest
+        If there is no catalog, or one of another version.
+
+    Notes
+    -----
+    Only matching entries of a SQLite file are read.
+
+    Examples
+    --------
+    >>> hrsynth.catalog.load(group="planar")["3(Rz*-Rz-Rz)"]["verdict"]
+    'controllable'
+    """
     require_askable(asked)
     kept = _there(path)
     groups = _groups(kept, asked)
@@ -135,41 +175,41 @@ def load(path: str | Path | None = None, **asked: Any) -> Catalog:
 
 
 def find_named(text: str, path: str | Path | None = None) -> list[Record]:
-    """The records of robots that are called so, or whose legs are, those first that a list shows first: names that
-    begin with the text before others. ``path`` as for :func:`load`."""
+    """Return the entries of robots with a name or legs, in the order of lists: names that begin with the text first.
+    ``path`` as for :func:`load`."""
     called = (each for each in load(path, text=text) if is_called(each, text))
-    found = {each["word"]: each for each in (*called, *load(path, legs=text))}.values()
+    found = {each["key"]: each for each in (*called, *load(path, legs=text))}.values()
     starts = f", {text}".casefold()
-    return sorted(found, key=lambda each: (starts not in f", {alias(each['word'])}".casefold(), *order(each)))
+    return sorted(found, key=lambda each: (starts not in f", {alias(each['key'])}".casefold(), *order(each)))
 
 
 def count(path: str | Path | None = None, **asked: Any) -> int:
-    """How many records there are of the groups among which those lie that are ``asked`` for."""
+    """Count the entries of the groups that are searched for criteria."""
     return sum(map(_there(path).count, covered(path, **asked)))
 
 
 def covered(path: str | Path | None = None, **asked: Any) -> list[str]:
-    """The names of the groups among which those lie that are ``asked`` for."""
+    """Return the names of the groups that are searched for criteria."""
     return _groups(_there(path), asked if asked.get("group") == SENSORS else {**asked, "group": None})
 
 
 def groups_of(path: str | Path | None = None) -> list[str]:
-    """The names of the groups that are there."""
+    """Return the names of the stored groups."""
     return _there(path).groups()
 
 
 def values(name: str, path: str | Path | None = None) -> list[Any]:
-    """The values of a field, one of ``FIELDS``, that records of all groups have, sorted."""
+    """Return the values of a field, one of ``FIELDS``, in the entries of all groups, sorted."""
     return _there(path).values(name)
 
 
 def _groups(kept: Store, asked: Mapping[str, Any]) -> list[str]:
-    """The groups in which is what is asked for."""
+    """Return the groups that are searched for criteria."""
     wanted = asked.get("group")
     return [
         name
         for name in kept.groups()
-        if name in _tuple(wanted) or (wanted is None and (name == SENSORS) == (asked.get("see") is not None))
+        if name in _tuple(wanted) or (wanted is None and (name == SENSORS) == (asked.get("sensor") is not None))
     ]
 
 
@@ -178,10 +218,12 @@ def _tuple(value: object) -> tuple[object, ...]:
 
 
 def _there(path: str | Path | None) -> Store:
-    """The store of a path, the shipped one where there is none; raises ``BadRequest`` where nothing is."""
+    """Return the store of a path, by default the shipped one; raises ``BadRequest`` if there is none."""
     kept = shipped_folder() if path is None else store(path)
     if path is not None and not kept.path.exists() and not isinstance(kept, ShippedCatalogs):
-        raise BadRequest("no such catalog", str(path), f"a folder, or a file that ends in {', '.join(DATABASES)}")
+        raise BadRequest(
+            f"--catalog {path}: not found", remedy=f"Name a folder or a file that ends in {', '.join(DATABASES)}."
+        )
     if not kept.groups():
-        raise BadRequest("nothing in the catalog", str(kept.path), "one that was built by hrsynth catalog build")
+        raise BadRequest(f"{kept.path}: no catalog", remedy="Build one with hrsynth catalog build.")
     return kept

@@ -1,4 +1,4 @@
-"""Where the catalog is kept: a folder with a file of lines for each group, or one SQLite file for all."""
+"""Stores of the catalog: a folder with a file of lines per group, or one SQLite file for all."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from ..untrusted import gunzip
 from .architecture_key import VERSION
 from .conditions import RecordQuestion, fill, places
 from .journal import ENDING, Journal
-from .jsonl import FLAGS, decode_lines, encode_lines, head_count, leading_word, record, require_version
+from .jsonl import FLAGS, REBUILD, decode_lines, encode_lines, head_count, leading_word, record, require_version
 
 DATABASES = (".sqlite", ".sqlite3", ".db")
-"""Endings of a store that is one SQLite file."""
+"""Extensions of a SQLite store."""
 LINES, PACKED = ".jsonl", ".jsonl.gz"
-"""Endings of the files of a folder."""
-TABLES = 2
+"""Extensions of the files of a folder."""
+TABLES = 3
 """Version of the tables of a SQLite file."""
 PACKED_ABOVE = 5_000
 """Records of a group above which its file is compressed, where it may unpack to so much."""
@@ -55,7 +55,7 @@ class Folder:
         return sorted({name.partition(LINES)[0] for name in names})
 
     def lines(self, groups: Sequence[str], asked: Mapping[str, Any]) -> list[str]:
-        """The lines of groups whose records fit what is asked for (:mod:`.conditions`), sorted by word in each."""
+        """Return the lines of groups that fit criteria (:mod:`.conditions`), sorted by key in each."""
         found, size = list[str](), 0
         for group in groups:
             content = self.content(group)
@@ -68,12 +68,12 @@ class Folder:
         """The bytes of a group's lines; raises ``BadRequest`` where they cannot be read."""
         file, content = self._bytes(group, LARGEST_CATALOG + 1)
         if len(content) > LARGEST_CATALOG:
-            raise BadRequest(f"{file}: file too large", None, f"up to {LARGEST_CATALOG} bytes, or a SQLite file")
+            raise BadRequest(f"{file}: more than {LARGEST_CATALOG} bytes", remedy="Build a .sqlite file.")
         if not file.name.endswith(PACKED):
             return content
         content = gunzip(content, file, LARGEST_CATALOG)
         if (count := content.count(b"\n")) > MOST_RECORDS:
-            raise BadRequest(f"{file}: lines", count, f"up to {MOST_RECORDS}, or a file that is not compressed")
+            raise BadRequest(f"{file}: lines", count, f"at most {MOST_RECORDS}", remedy="Build a .sqlite file.")
         return content
 
     def _bytes(self, group: str, most: int) -> tuple[Path, bytes]:
@@ -83,7 +83,7 @@ class Folder:
             return file, stream.read(most)
 
     def count(self, group: str) -> int:
-        """How many lines a group has."""
+        """Return the number of lines of a group."""
         file, content = self._bytes(group, LARGEST_RECORD)
         if file.name.endswith(PACKED):
             with contextlib.suppress(zlib.error):
@@ -102,8 +102,8 @@ class Folder:
         large = PACKED_ABOVE < len(lines) < MOST_RECORDS
         content = encode_lines(group, lines, checksum=not large)
         if len(content) > LARGEST_CATALOG:
-            allowed = f"up to {LARGEST_CATALOG}, or a SQLite file"
-            raise BadRequest(f"{self.path / group}: lines of {len(content)} bytes", None, allowed)
+            text = f"{self.path / group}: {len(content)} bytes, more than {LARGEST_CATALOG}"
+            raise BadRequest(text, remedy="Build a .sqlite file.")
         file, other = (packed, plain) if large else (plain, packed)
         with writable(file), replacement(file, sync=True) as draft:
             draft.write_bytes(gzip.compress(content, mtime=0) if large else content)
@@ -137,8 +137,7 @@ class ShippedCatalogs(Folder):
 
 
 class Database:
-    """One SQLite file with the same lines, and tables that tell which of them fit (:mod:`.conditions`); it is asked as
-    a folder is."""
+    """SQLite file with the same lines, and tables for criteria (:mod:`.conditions`); same methods as a folder."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -146,7 +145,7 @@ class Database:
     def groups(self) -> list[str]:
         found = self._column("SELECT name FROM groups ORDER BY name")
         if not all(isinstance(name, str) for name in found):
-            raise BadRequest(f"{self.path}: not a catalog file: a group without a name")
+            raise BadRequest(f"{self.path}: not a catalog file: a group without a name", remedy=REBUILD)
         return found
 
     def lines(self, groups: Sequence[str], asked: Mapping[str, Any]) -> Sequence[str]:
@@ -155,7 +154,8 @@ class Database:
             file = self._open()
             counted = "sum(count), (SELECT max(record) FROM records), (SELECT max(record) FROM lines)"
             if len(set(file.execute(f"SELECT {counted} FROM groups").fetchone())) > 1:
-                raise BadRequest(f"{self.path}: not a catalog file: its records and its lines differ in number")
+                text = f"{self.path}: not a catalog file: entries and lines differ in number"
+                raise BadRequest(text, remedy=REBUILD)
             return StoredLines(self.path, file, question.rows(file))
 
     def count(self, group: str) -> int:
@@ -184,7 +184,7 @@ class Database:
         return self.path
 
     def _column(self, asked: str, *values: object) -> list[Any]:
-        """What is found in one column; raises ``BadRequest`` for something else than a catalog, or another version."""
+        """Return the values of one column; raises ``BadRequest`` for another file or version."""
         with _refusing_sqlite_errors(self.path), contextlib.closing(self._open()) as file:
             return [value for (value,) in file.execute(asked, values)]
 
@@ -193,13 +193,13 @@ class Database:
         with _readable(self.path), open_regular(self.path) as stream:
             head = stream.read(20)
         if b"\2" in head[18:]:
-            raise BadRequest(f"{self.path}: not a catalog file: it has a write-ahead log")
+            raise BadRequest(f"{self.path}: not a catalog file: it has a write-ahead log", remedy=REBUILD)
         file = sqlite3.connect(f"{self.path.absolute().as_uri()}?mode=ro", uri=True, check_same_thread=False)
         file.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_RECORD)
         file.execute("PRAGMA trusted_schema = OFF")
         for name, made in file.execute("SELECT name, sql FROM sqlite_master WHERE sql IS NOT NULL"):
             if not _PLAIN.match(str(made)):
-                raise BadRequest(f"{self.path}: not a catalog file: it holds", name, "plain tables")
+                raise BadRequest(f"{self.path}: not a catalog file", name, "plain tables", remedy=REBUILD)
         found = file.execute("SELECT format, catalog FROM versions").fetchone() or (None, None)
         require_version(found, str(self.path), TABLES)
         return file
@@ -226,7 +226,7 @@ class StoredLines(Sequence[str]):
             with _refusing_sqlite_errors(self._path):
                 (line,) = self._file.execute("SELECT line FROM lines WHERE record = ?", (row,)).fetchone() or (None,)
             if not isinstance(line, str):
-                raise BadRequest(f"{self._path}: not a catalog file: rows without a line")
+                raise BadRequest(f"{self._path}: not a catalog file: rows without a line", remedy=REBUILD)
             self._size += len(line)
             _require_small(self._size, self._path)
             self._read[row] = line
@@ -236,12 +236,12 @@ class StoredLines(Sequence[str]):
 def _require_small(size: int, file: Path) -> None:
     """Raise ``BadRequest`` for lines that are larger together than may be read."""
     if size > LARGEST_CATALOG:
-        raise BadRequest(f"{file}: lines of more than {LARGEST_CATALOG} bytes", None, "a smaller catalog")
+        raise BadRequest(f"{file}: lines of more than {LARGEST_CATALOG} bytes", remedy="Restrict the search.")
 
 
 def store(path: str | Path) -> Store:
-    """The store of this name: a SQLite file by its ending, else a folder; ``published`` or ``all`` of the package,
-    where there is no such folder."""
+    """Return the store of a name: a SQLite file by its extension, else a folder; ``published`` or ``all`` of the
+    package, unless there is such a folder."""
     path = Path(path)
     if path == Path(ALL) and not path.exists():
         return ShippedCatalogs(shipped_folder().path)
@@ -266,11 +266,11 @@ def _open_journal(file: Path, name: str, group: str, anew: bool) -> Journal:
 
 @contextlib.contextmanager
 def _refusing_sqlite_errors(file: Path) -> Iterator[None]:
-    """What SQLite complains of is a bad request."""
+    """Raise ``BadRequest`` for an error of SQLite."""
     try:
         yield
     except sqlite3.Error as error:
-        raise BadRequest(f"{file}: not a catalog file: {error}") from None
+        raise BadRequest(f"{file}: not a catalog file: {error}", remedy=REBUILD) from None
 
 
 @contextlib.contextmanager
@@ -278,7 +278,9 @@ def _readable(file: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise BadRequest(f"cannot read the catalog: {error.strerror}", str(file)) from None
+        raise BadRequest(
+            f"{file}: cannot be read: {error.strerror}", remedy="Check the path and its access rights."
+        ) from None
 
 
 @contextlib.contextmanager
@@ -289,7 +291,7 @@ def writable(file: Path, what: str = "catalog") -> Iterator[None]:
     except OSError as error:
         if error.errno in FULL:
             raise BuildStopped(f"{file}: {error.strerror}") from None
-        raise BadRequest(f"cannot write the {what}: {error.strerror}", str(file)) from None
+        raise BadRequest(f"{file}: cannot write the {what}: {error.strerror}", remedy="Choose another path.") from None
 
 
 def write_tables(path: Path, groups: Mapping[str, Iterable[str]]) -> None:

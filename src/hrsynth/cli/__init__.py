@@ -1,4 +1,4 @@
-"""The command line: thin. Text to standard output, progress and warnings to standard error; exit status 0, 2 or 3."""
+"""Command line. Text goes to standard output, progress and warnings to standard error; exit status 0, 1, 2 or 3."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ app.commands["catalog"] = catalog
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line; every failure is one line a defect, never a traceback."""
+    """Run the command line; a failure prints one line per defect, never a traceback."""
     for library in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(library, "1")
     gc.set_threshold(200_000)
     sys.stdout, sys.stderr = sys.stdout or io.StringIO(), sys.stderr or io.StringIO()
-    for number in range(3):  # no file that is opened takes the place of a closed one
+    for number in range(3):  # no opened file gets the number of a closed stream
         try:
             os.fstat(number)
         except OSError:
@@ -43,8 +43,7 @@ def main(arguments: list[str] | None = None) -> None:
             stream.reconfigure(encoding="utf-8", errors="replace")
     if not os.path.isfile(__file__):
         say(
-            f"hrsynth: it runs from a folder, not from an archive, found {os.path.dirname(os.path.dirname(__file__))}, "
-            "allowed: a package that pip installs",
+            f"hrsynth: {os.path.dirname(os.path.dirname(__file__))}: cannot run from an archive. Install it with pip.",
             err=True,
         )
         sys.exit(2)
@@ -52,11 +51,11 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def execute(arguments: list[str] | None = None) -> int:
-    """Run a command; the exit status."""
+    """Run a command and return its exit status."""
     try:
         with warnings.catch_warnings():
             for kind in (AssumedBase, AssumedPlatform):
-                warnings.simplefilter("ignore", kind)  # a note says it
+                warnings.simplefilter("ignore", kind)  # printed as a note
             app.main(sys.argv[1:] if arguments is None else arguments)
         sys.stdout.flush()
         return 0
@@ -71,14 +70,14 @@ def execute(arguments: list[str] | None = None) -> int:
         if error.filename is not None or error.errno not in (errno.ENOSPC, errno.EIO, errno.EBADF):
             return _report_failure(error)
         close(sys.stdout)
-        say(f"hrsynth: cannot write to standard output: {error.strerror}", err=True)
+        say(f"hrsynth: cannot write to standard output: {error.strerror}. Free space, or write elsewhere.", err=True)
         return 2
     except Exception as error:
         return _report_failure(error)
 
 
 def _report_failure(error: Exception) -> int:
-    """Say what went wrong; the exit status."""
+    """Print a failure and return the exit status."""
     from ..errors import HrsynthError
 
     if isinstance(error, HrsynthError):
@@ -88,5 +87,5 @@ def _report_failure(error: Exception) -> int:
     if os.environ.get("HRSYNTH_DEBUG"):
         raise error
     what = " ".join(f"{type(error).__name__}: {error}".split())
-    say(f"hrsynth: a defect of hrsynth itself, please report it: {what}", err=True)
+    say(f"hrsynth: internal error: {what}. Report it with the command and its files.", err=True)
     return 3

@@ -1,4 +1,4 @@
-"""The commands that ask one question about a robot: their options, and the outputs of their answers."""
+"""Commands that run one analysis of a robot: their options, and the outputs of their results."""
 
 from __future__ import annotations
 
@@ -20,9 +20,8 @@ from .studio import PORT, serve
 
 @dataclass(frozen=True)
 class Question:
-    """A command that asks an analysis of this ``name``: its options as declared, those of its files, and ``more``.
-    ``shows`` is called with the answer instead of printing the text where nothing was written, and ``needs`` says
-    before the work what it lacks."""
+    """Command of an analysis: its declared options, those of its files, and ``more``. ``shows`` replaces printing
+    when no file was written; ``needs`` raises beforehand if a library is missing."""
 
     name: str
     more: tuple[Option, ...] = ()
@@ -30,7 +29,7 @@ class Question:
     needs: Callable[[], object] | None = None
 
     def add(self, app: Group) -> None:
-        """Make it a command."""
+        """Register the command."""
         declared = analyses()[self.name]
         files = outputs_of(self.name).files
         given = options(self.name)
@@ -43,7 +42,7 @@ class Question:
         add_command(app, self.name, declared["help"], every, self.answer, declared["examples"])
 
     def answer(self, *, json: bool, **values: Any) -> None:
-        """Ask, write the files that are asked for, print."""
+        """Run the analysis, write the requested files, print the result."""
         import hrsynth
 
         from ..description.files import require_other
@@ -100,7 +99,7 @@ class Question:
         found.require_answered(**values)
 
     def _given_options(self, function: Callable[..., Any], values: dict[str, Any]) -> dict[str, Any]:
-        """The options that a function takes and that are given."""
+        """Return the given options that a function takes."""
         known = inspect.signature(function).parameters
         given = {name: value for name, value in values.items() if name in known and value is not None}
         if "observe" in given:
@@ -111,7 +110,7 @@ class Question:
 
 
 def _servable() -> None:
-    """Raise ``MissingExtra`` where a library that serves pages is missing."""
+    """Raise ``MissingExtra`` if a library that serves pages is missing."""
     from ..present.studio.server import require_libraries
 
     require_libraries()
@@ -126,16 +125,14 @@ def _serve_view(found: Any, source: dict[str, Any], port: int, open_: bool, **_:
 
 
 def _file_option(file: File) -> Option:
-    """The option of a file that an answer can be written to."""
+    """Return the option of a file to which a result can be written."""
     if file.option == "output":
         return output(file.help)
     return Option(str(file.option), file.help, "FILE", group=OUTPUT)
 
 
 FIGURE = (
-    Option(
-        "width", "Width of a figure, such as 88mm or 3.5in, laid out for that with text of 8pt.", "LENGTH", group=OUTPUT
-    ),
+    Option("width", "Width of a figure, such as 88mm or 3.5in; its text has 8pt.", "LENGTH", group=OUTPUT),
     Option("font", "Font of a figure, its size, or both: serif, 8pt, 'DejaVu Sans 8pt'.", group=OUTPUT),
 )
 VIEW = Question(
@@ -145,4 +142,4 @@ VIEW = Question(
     _servable,
 )
 QUESTIONS = tuple(VIEW if name == VIEW.name else Question(name) for name in analyses())
-"""The commands in the order of the help."""
+"""Commands in the order of the help."""

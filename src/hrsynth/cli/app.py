@@ -1,4 +1,4 @@
-"""The command line's commands; each module of this folder adds its own."""
+"""Root of the commands; each module of this folder adds its own."""
 
 from .commands import Group
 
@@ -11,6 +11,6 @@ def _version() -> str:
 
 app = Group(
     "hrsynth",
-    "Hidden robots of parallel robots that are controlled by watching the directions of their legs.",
+    "Hidden robots of parallel robots that are controlled by observing the directions of their legs.",
     _version,
 )

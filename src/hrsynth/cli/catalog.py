@@ -1,10 +1,10 @@
-"""The commands of the catalog: build, list, show, site.
+"""Commands of the catalog: build, list, show, site.
 
-Their records, besides ``command`` ("catalog build" …) and ``version``: ``build`` gives ``groups``, each with
-``group``, ``words``, ``now`` (made), ``before`` and ``file`` (null while it is not complete), with ``--check`` instead
-``stale``, one text for each thing; ``list`` gives ``total``, ``groups`` (those that are covered) and ``entries``;
+Their JSON objects, besides ``command`` ("catalog build" …) and ``version``: ``build`` gives ``groups``, each with
+``group``, ``keys``, ``now`` (computed), ``before`` and ``file`` (null until complete), with ``--check`` instead
+``stale``, one text for each difference; ``list`` gives ``total``, ``groups`` (those searched) and ``entries``;
 ``show`` gives ``entry``, ``drawing`` (lines), ``note``, ``smallest`` (the smallest sets with their hidden robots) and
-``file``; ``site`` as told by ``catalog site --help``.
+``file``; ``site`` as in ``catalog site --help``.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ if TYPE_CHECKING:
 
 catalog = Group(
     "hrsynth catalog",
-    "The catalog of architectures: what can be controlled by watching legs.",
+    "The catalog of architectures: which can be controlled by observing legs.",
     examples=("list --legs 3-R*RR --verdict controllable", "show Delta -o delta.urdf", "list -h"),
 )
 VERDICTS = ("controllable", "partially controllable", "uncontrollable")
 KEPT = Option(
     "kept",
-    "A folder or SQLite file; or published: the shipped catalog of published robots; or all: this "
-    "and the shipped catalog of words (default: all for list, else that of words).",
+    "A folder or SQLite file; published: the shipped catalog of published robots; or all: this and the shipped "
+    "catalog of architectures (default: all for list, else that of architectures).",
     "PATH",
     flags=("--catalog",),
 )
@@ -46,44 +46,44 @@ WORKERS = Option("workers", "Processes that share the work.", None, int, 1, low=
 ANEW = flag("anew", "Discard the results of an interrupted build.")
 FILTER = (
     Option("legs", "Number of legs, or a pattern of the notation or of one leg's chain: 3-R*, PUS.", "LEGS"),
-    Option("dof", "Freedoms of the platform.", kind=int, low=0),
+    Option("dof", "Platform dof.", kind=int, low=0),
     Option("motion", "Its translations and rotations, such as 3T or 2T1R."),
     Option("verdict", f"{', '.join(VERDICTS)}.", words=VERDICTS),
     Option(
-        "see",
-        "What is seen of the platform instead of legs, such as 3point or 2point+image_line; add ' for one camera each.",
+        "sensor",
+        "Observations of the platform instead of legs, such as 3point or 2point+image_line; add ' for one camera each.",
         "KINDS",
     ),
     Option(
         "group", "planar, mixed, pods, deltas, schoenflies, spatial, sensors; for published tables 3T0R and the like."
     ),
     Option("base_motors", "Whether all motors are on the base.", kind=bool, flags=("--base-motors/--moving-motors",)),
-    Option("motors", "Kinds of all driven joints: R, P, U, C, or several joined by +.", "KINDS"),
-    Option("driven", "Whether the motors determine all freedoms.", kind=bool, flags=("--driven/--not-driven",)),
+    Option("motors", "Kinds of all actuated joints: R, P, U, C, or several joined by +.", "KINDS"),
+    Option("driven", "Whether the motors determine all platform dof.", kind=bool, flags=("--driven/--not-driven",)),
     Option(
         "parallelograms",
         "Whether a leg has a parallelogram, or two equal parallel rods.",
         kind=bool,
         flags=("--parallelograms/--no-parallelograms",),
     ),
-    Option("fewest", "Number of legs that must be watched.", kind=int, low=0),
-    Option("modes", "Number of assembly modes, complex ones too.", kind=int, low=0),
+    Option("fewest", "Number of legs in the smallest set with the largest rank.", kind=int, low=0),
+    Option("modes", "Number of assembly modes, complex ones included.", kind=int, low=0),
     Option("text", "Text that occurs in any field, or a name: Delta."),
 )
-"""Which architectures are asked for."""
+"""Criteria that select architectures."""
 
 
 class MotorChoiceRecord(TypedDict):
-    """A choice of motors of a published robot: the joints driven in each leg, from 1, and the freedoms they see."""
+    """A choice of motors of a published robot: the actuated joints of each leg, from 1, and the dof they determine."""
 
     joints: list[list[int]]
     rank: int
 
 
 class Entry(TypedDict, total=False):
-    """An architecture of the catalog; a refused one has only its word, group, notation and the reason."""
+    """An architecture of the catalog; a refused one has only its key, group, notation and the reason."""
 
-    word: str
+    key: str
     group: str
     notation: str
     refused: str
@@ -91,16 +91,14 @@ class Entry(TypedDict, total=False):
     choices: list[MotorChoiceRecord]
     condition: str
     confirmed: int
-    cure: str
     dof: int
     driven: bool
     exact: bool
     fewest: int
     hidden: str
-    idle: int
+    internal: int
     instances: int
     legs: int
-    lost: list[str]
     minimal: list[list[str]]
     mobility: int
     modes_bound: int
@@ -111,8 +109,10 @@ class Entry(TypedDict, total=False):
     motor_rank: int
     motors: int
     rank: int
-    sensor: Annotated[str, "what is seen of the platform instead of legs"]
+    sensors: Annotated[str, "observations of the platform instead of legs"]
     steps: list[str]
+    suggestion: str
+    unobserved: list[str]
     verdict: Word
     attempt: int | None
 
@@ -126,12 +126,12 @@ class CatalogList(Head):
 
 
 class SmallestSetRecord(TypedDict):
-    """A smallest set of legs and its hidden robot; what went wrong where none was derived."""
+    """A smallest set of legs and its hidden robot, or the reason why none was derived."""
 
     legs: list[str]
     hidden: str | None
     problem: str | None
-    near: Annotated[int | None, "near modes found, where the entry counts the modes of this set"]
+    near_matches: Annotated[int | None, "near modes found, where the entry counts the modes of this set"]
 
 
 class CatalogShow(Head):
@@ -145,31 +145,31 @@ class CatalogShow(Head):
 
 
 class BuiltGroup(TypedDict):
-    """A group: how many words it has, how many were made now and before; its file is null until it is complete."""
+    """A group: the number of its keys, of entries computed now and before; its file is null until it is complete."""
 
     group: str
-    words: int
+    keys: int
     now: int
     before: int
     file: str | None
 
 
 class CatalogBuild(Head):
-    """What a build made, or with --check what is stale."""
+    """Groups of a build, or with --check what is stale."""
 
     groups: NotRequired[list[BuiltGroup]]
     stale: NotRequired[list[str]]
 
 
 class Differing(TypedDict):
-    """A derivation that does not end in what the catalog says."""
+    """A derivation that differs from the catalog entry."""
 
-    word: str
+    key: str
     derived: str
 
 
 class CatalogSite(Head):
-    """What a site holds, and where it starts."""
+    """A site: its size and its start page."""
 
     index: str
     architectures: int
@@ -196,13 +196,16 @@ def build(
     json: bool,
     seed: int,
 ) -> None:
-    """Build the catalog or (``check``) compare what is stored with what would be built."""
+    """Build the catalog, or with ``check`` compare a stored one with what would be built."""
     from ..errors import BadRequest, CatalogStale
 
     senseless = {"--limit": limit is not None, "--anew": anew} if check else {"--sample": sample is not None}
     for option, given in senseless.items():
         if given:
-            raise BadRequest(f"{option} {'with' if check else 'without'} --check", None)
+            raise BadRequest(
+                f"{option}: {'not possible with' if check else 'needs'} --check",
+                remedy=f"{'Omit' if check else 'Add'} --check.",
+            )
     if check:
         from ..catalog.build import check as run
         from ..catalog.store import shipped_folder
@@ -259,12 +262,12 @@ def entries(kept: str | None, json: bool, **asked: Any) -> None:
 
 
 def _asked(kept: str | None, asked: dict[str, Any]) -> Catalog:
-    """The architectures that fit; raises ``BadRequest`` for a search that none can fit, or that says nothing."""
+    """Return the architectures that fit; raise ``BadRequest`` for an empty search or one that none can fit."""
     from ..catalog import load
     from ..errors import BadRequest
 
     if asked["text"] is not None and not asked["text"].strip():
-        raise BadRequest("--text: nothing to look for", asked["text"], f"a name or a text: {', '.join(_names()[:3])} …")
+        raise BadRequest("--text: empty", remedy=f"Search for a name or a text, such as {_names()[0]}.")
     found = load(kept, **asked)
     if not found:
         _require_known(kept, asked)
@@ -272,14 +275,14 @@ def _asked(kept: str | None, asked: dict[str, Any]) -> Catalog:
 
 
 def _names() -> list[str]:
-    """The names under which robots are known."""
+    """Return the names under which robots are known."""
     from ..catalog.known import aliases
 
     return sorted({name for names in aliases().values() for name in names.split(", ")})
 
 
 def _require_known(kept: str | None, asked: dict[str, Any]) -> None:
-    """Raise ``BadRequest`` for what is asked and no record of the catalog has at all: why none fits."""
+    """Raise ``BadRequest`` for a value that no entry of the catalog has."""
     from ..catalog import load
     from ..catalog.query import groups_of, values
     from ..errors import BadRequest
@@ -297,24 +300,20 @@ def _require_known(kept: str | None, asked: dict[str, Any]) -> None:
         if asked[name] is not None and asked[name] not in (
             known := named[name] if name in named else values(field, kept)
         ):
-            raise BadRequest(
-                f"no architecture of the catalog has this --{name}", asked[name], list(map(str, sorted(known)))
-            )
+            raise BadRequest(f"--{name}: no such entry in the catalog", asked[name], list(map(str, sorted(known))))
     if asked["legs"] is not None and not load(kept, group=tuple(groups), legs=asked["legs"]):
         raise BadRequest(
-            "no architecture of the catalog has such legs",
+            "--legs: no such entry in the catalog",
             asked["legs"],
-            "their number, "
-            f"{', '.join(map(str, values('legs', kept)))}, or a pattern in which * and ? stand for "
-            "letters: 3-R*RR, PUS, 6-*",
+            list(map(str, values("legs", kept))),
+            remedy="Give a number or a pattern such as 3-R*RR, PUS, 6-*.",
         )
     if asked["text"] is not None and not load(kept, group=tuple(groups), text=asked["text"]):
         near = {name.casefold(): name for names in _names() for name in (names, *names.split())}
         close = get_close_matches(asked["text"].casefold(), near, cutoff=0.5)
         raise BadRequest(
-            "no architecture of the catalog has this --text in a field or a name",
-            asked["text"],
-            ", ".join([near[name] for name in close] or _names()[:3]) + " …",
+            f"--text {asked['text']}: not found in any field or name of the catalog",
+            remedy=f"Search for another text, such as {' or '.join([near[name] for name in close] or _names()[:3])}.",
         )
 
 
@@ -332,9 +331,8 @@ def show(word: str, output: str | None, kept: str | None, json: bool) -> None:
         if output is not None:
             if "refused" in found.record:
                 raise BadRequest(
-                    f"no robot of a refused architecture is written: {found.record['refused']}",
-                    word,
-                    "an architecture with a verdict: hrsynth catalog list",
+                    f"--output: the catalog refuses {word}: {found.record['refused']}",
+                    remedy="Choose an architecture with a verdict (hrsynth catalog list).",
                 )
             robot = found.mechanism()
         smallest = [] if found.studied is None else smallest_sets(found.record, found.studied())
@@ -358,8 +356,8 @@ def show(word: str, output: str | None, kept: str | None, json: bool) -> None:
 
 @dataclass(frozen=True)
 class _Shown:
-    """An architecture: its record, how it is drawn (nothing where it is no word), what else is to be said, a robot
-    of it, and the one that was studied (None where its geometry is not at hand)."""
+    """An architecture: its entry, drawing (empty if it has no key), a note, its robot, and the robot that was
+    analysed (None if its geometry is not available)."""
 
     record: Any
     drawn: str
@@ -372,7 +370,8 @@ def _no_geometry(name: str) -> Mechanism:
     from ..errors import BadRequest
 
     raise BadRequest(
-        "a published robot's chain is in its tables", name, "python -m parroblib robot (studies/parroblib)"
+        f"{name}: the catalog has no geometry of published robots",
+        remedy="Use python -m parroblib robot (studies/parroblib).",
     )
 
 
@@ -399,7 +398,7 @@ def _of_word(text: str, kept: str | None) -> _Shown:
 
 
 def site(output: str, workers: int, anew: bool, kept: str | None, json: bool, **asked: Any) -> None:
-    """Write the pages of the architectures that fit; of those with equal legs, where nothing is asked for."""
+    """Write the pages of the architectures that fit; without criteria of those with equal legs."""
     from ..catalog import Catalog
     from ..catalog.known import equal_legs
     from ..catalog.site import site as run
@@ -408,28 +407,30 @@ def site(output: str, workers: int, anew: bool, kept: str | None, json: bool, **
 
     found = _asked(kept, asked)
     if all(value is None for value in asked.values()):
-        found, every = Catalog([each for each in found if equal_legs(each["word"])]), len(found)
+        found, every = Catalog([each for each in found if equal_legs(each["key"])]), len(found)
         if len(found) < every:
             warn(
                 f"{every - len(found):,} architectures with unequal legs get no page; "
                 "select them, for example by --group"
             )
-    if seen := [each["word"] for each in found if "see" in each]:
-        raise BadRequest("no pages are made for words with sensors", seen[0], "hrsynth catalog show, list")
-    if published := [each["word"] for each in found if "choices" in each]:
-        raise BadRequest("no pages are made for published robots", published[0], "hrsynth catalog show, list")
+    if seen := [each["key"] for each in found if "sensors" in each]:
+        raise BadRequest(
+            f"no pages for keys with sensors, such as {seen[0]}", remedy="Use hrsynth catalog show or list."
+        )
+    if published := [each["key"] for each in found if "choices" in each]:
+        raise BadRequest(
+            f"no pages for published robots, such as {published[0]}", remedy="Use hrsynth catalog show or list."
+        )
     with Progress(counted=True) as progress:
         done = run(found, output, workers=workers, anew=anew, tell=progress.count)
     if done.differ:
         word, derived = done.differ[0]
-        warn(
-            f"{len(done.differ)} derivations do not end in what the catalog says, the first: {word}, derived {derived}"
-        )
+        warn(f"{len(done.differ)} derivations differ from the catalog, the first: {word}, derived {derived}")
     _say("site", done.to_dict(), describe_site(done.to_dict()), json)
 
 
 def _word(text: str, kept: str | None) -> tuple[str, str]:
-    """The word of an architecture that is given by it, by a name or by its legs, and what else is called so."""
+    """Return the key of an architecture, given as key, name or legs, and a note on others of that name."""
     from ..catalog.architecture_key import parse
     from ..catalog.known import alias
     from ..catalog.query import find_named
@@ -438,22 +439,21 @@ def _word(text: str, kept: str | None) -> tuple[str, str]:
     try:
         return str(parse(text)), ""
     except BadRequest:
-        found = find_named(text, kept) if text.strip() and "@" not in text else []  # no name has what is seen
+        found = find_named(text, kept) if text.strip() and "@" not in text else []  # no name has sensors
         if not found and "(" in text:
             raise
         if not found:
             raise BadRequest(
-                "no architecture of the catalog has this name or such legs",
-                text,
-                f"a word such as '3(Rz*-Rz-Rz)'; hrsynth catalog list --text {shlex.quote(text)} searches all fields",
+                f"{text}: no architecture of the catalog has this name or legs",
+                remedy=f"Give a key such as '3(Rz*-Rz-Rz)', or run hrsynth catalog list --text {shlex.quote(text)}.",
             ) from None
-    word = found[0]["word"]
-    more = [f"{len(found)} have this name: {', '.join(each['word'] for each in found[1:4])} …"] if found[1:] else []
+    word = found[0]["key"]
+    more = [f"{len(found)} have this name: {', '.join(each['key'] for each in found[1:4])} …"] if found[1:] else []
     return word, "; ".join([*filter(None, [alias(word)]), *more])
 
 
 def _known_record(word: str, kept: str | None) -> tuple[Any, str]:
-    """The record of a word, and where it comes from if not from the catalog."""
+    """Return the entry of a key, and a note if it is not from the catalog."""
     from ..catalog import load
     from ..catalog.architecture_key import parse
     from ..catalog.build import architectures, make_records
@@ -467,21 +467,21 @@ def _known_record(word: str, kept: str | None) -> tuple[Any, str]:
         if word in found:
             return found[word], ""
     ((_, line),) = make_records(architectures().entry, own, [word])
-    return javascript.loads(line), "not in the catalog, studied now"
+    return javascript.loads(line), "not in the catalog, analysed now"
 
 
 def _target(output: str | None) -> Path:
-    """Where to build: what was named, or ``catalog/`` of the checkout; never an installed package."""
+    """Return the target of a build: the given one, or ``catalog/`` of the checkout; never an installed package."""
     from importlib import resources
 
     from ..errors import BadRequest
 
     if output is None and not (Path("catalog").is_dir() and Path("pyproject.toml").is_file()):
-        raise BadRequest("nowhere to build", None, "-o FOLDER or -o FILE.sqlite")
+        raise BadRequest("build needs --output", remedy="Give -o FOLDER or -o FILE.sqlite.")
     target = Path(output or "catalog")
     package = Path(str(resources.files("hrsynth"))).resolve()
     if target.resolve().is_relative_to(package):
-        raise BadRequest("cannot build into the package", str(target), "another folder")
+        raise BadRequest(f"--output {target}: inside the installed package", remedy="Choose another folder.")
     return target
 
 
@@ -497,44 +497,44 @@ COMMANDS = (
             Option("cluster", "A dask cluster that shares the work.", "ADDRESS"),
             flag(
                 "check",
-                "Build nothing: compare what is stored (default: what is shipped) with what would be built; exit 3 "
-                "if it is stale.",
+                "Build nothing: compare a stored catalog (default: the shipped one) with what would be built; "
+                "exit status 3 if it is stale.",
             ),
             Option(
                 "sample",
-                "With --check: compare only this many records of each group, drawn at random, and all words.",
+                "With --check: compare only this many random entries of each group, and all keys.",
                 "N",
                 int,
                 low=0,
             ),
-            Option("limit", "Stop after this many new records; the same command continues.", "N", int, low=0),
+            Option("limit", "Stop after this many new entries; the same command continues.", "N", int, low=0),
             ANEW,
             JSON,
             Option("seed", "Seed of --sample.", None, int, 0, low=0),
         ),
     ),
-    ("list", "The architectures that fit.", entries, (*FILTER, KEPT, JSON)),
+    ("list", "List the architectures that fit.", entries, (*FILTER, KEPT, JSON)),
     (
         "show",
-        "One architecture, drawn and in full; one that is not in the catalog is analysed on request.",
+        "Show one architecture, drawn and in full; one that is not in the catalog is analysed.",
         show,
         (
             Option(
                 "word",
-                "An architecture, such as '3(Rz*-Rz-Rz)', or a name or legs: Delta, 3-RPS.",
-                "WORD",
+                "A key such as '3(Rz*-Rz-Rz)', a name or legs: Delta, 3-RPS.",
+                "KEY",
                 default=NEEDED,
                 argument=True,
             ),
-            output("Write a robot of this architecture (.urdf, or another dialect)."),
+            output("Write a robot of this architecture (.urdf, or another format)."),
             KEPT,
             JSON,
         ),
     ),
     (
         "site",
-        "Web pages of the architectures that fit: a list with filters, drawings, derivations, robot files; they "
-        "need no server.",
+        "Write web pages of the architectures that fit: a list with filters, drawings, derivations, robot files; "
+        "no server needed.",
         site,
         (
             output("A new or empty folder, or an older site, which is replaced.", "DIR", NEEDED),

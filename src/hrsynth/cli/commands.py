@@ -1,4 +1,4 @@
-"""Commands made of their declared options: how the words of a command line are read by them, and the help."""
+"""Commands from declared options: parsing of the command line, and the help."""
 
 from __future__ import annotations
 
@@ -16,15 +16,14 @@ from .colour import paint_help, say
 HELP = ("-h", "--help")
 HELP_ROW = (", ".join(HELP), "Show this message and exit.")
 POSES = ("--at", "--goal")
-"""What the pose of a question is called: where the robot is, where runs should end, where one way leads."""
+"""Options of the pose of a command: the robot's pose, or the goal of runs and paths."""
 LIKE_A_FLAG = 0.7
-"""How much alike a word and an option are of which it may be a misspelling."""
+"""Least similarity of a misspelt option."""
 
 
 @dataclass(frozen=True, eq=False)
 class DeclaredCommand:
-    """A command: what it says of itself, its options, what is run with all of them by name, and examples without its
-    name."""
+    """Command: help, options, the function that is called with all of them by name, and examples without its name."""
 
     path: str
     help: str
@@ -32,15 +31,15 @@ class DeclaredCommand:
     run: Callable[..., None]
     examples: Sequence[str] = ()
     record: Any = None
-    """The type of what it prints with ``--json``, where that is no answer of a public function of its name."""
+    """Type of its JSON, unless it is the result of the public function of its name."""
 
     @property
     def name(self) -> str:
-        """As it is called after ``hrsynth``."""
+        """Name after ``hrsynth``."""
         return self.path.partition(" ")[2]
 
     def main(self, words: Sequence[str], beside: Sequence[DeclaredCommand] = ()) -> None:
-        """Run the command on the words after its name, or show its help; ``beside`` are other commands."""
+        """Run the command on the words after its name, or show its help; ``beside``: the other commands."""
         values = self.values(words, beside)
         if values is None:
             say(self.help_text(), paint=paint_help)
@@ -48,7 +47,7 @@ class DeclaredCommand:
             self.run(**values)
 
     def values(self, words: Sequence[str], beside: Sequence[DeclaredCommand] = ()) -> dict[str, Any] | None:
-        """The value of each option by its name, None where help is requested. Raises ``BadRequest``.
+        """Return the value of each option by its name, None if help is requested. Raises ``BadRequest``.
 
         Options stand anywhere before ``--``, as ``--name VALUE``, ``--name=VALUE``, ``-n VALUE``, ``-n=VALUE`` or
         ``-nVALUE``.
@@ -70,7 +69,10 @@ class DeclaredCommand:
         for word in takewhile("--".__ne__, rest):
             value = next(rest, None) if word in flags and flags[word][0].kind is not bool else None
             if value in flags:
-                raise BadRequest(f"{word} needs a value", value, f"{flags[word][0].value}, or {word}={value}")
+                raise BadRequest(
+                    f"{word}: value missing before {value}",
+                    remedy=f"Give {flags[word][0].value}, or write {word}={value}.",
+                )
             joined.append(word if value is None else f"{word}={value}")
         if set(HELP) & set(joined):
             return None
@@ -85,14 +87,13 @@ class DeclaredCommand:
 
             if name in POSES and (own := [each for each in flags if each in POSES]):
                 usual = flags[own[-1]][0].names[0]
-                raise BadRequest(f"{self.name}: no such option", name, f"{usual} for the pose of this question")
+                raise BadRequest(f"{self.name} has no option {name}", remedy=f"Use {usual} for the pose.")
             if takers := [each.name for each in beside if any(name in option.names for option in each.options)]:
-                raise BadRequest(f"{self.name} has no such option", name, f"it belongs to {', '.join(takers)}")
-            raise BadRequest(
-                f"{self.name}: no such option",
-                name,
-                get_close_matches(name, flags, cutoff=LIKE_A_FLAG) or sorted(flags),
-            )
+                raise BadRequest(
+                    f"{self.name} has no option {name}", remedy=f"Omit it; it belongs to {', '.join(takers)}."
+                )
+            close = get_close_matches(name, flags, cutoff=LIKE_A_FLAG) or sorted(flags)
+            raise BadRequest(f"{self.name} has no option {name}", remedy=f"Use {', '.join(close)}.")
         given: dict[str, list[Any]] = vars(found)
         plain += rest
         for option in self.options:
@@ -102,24 +103,26 @@ class DeclaredCommand:
         # Python 3.11 and 3.12 make [] of the value "--"
         for option in self.options:
             if option.names_several and len(texts := given.get(option.name, ())) > 1:
-                raise BadRequest(f"{option.names[0]} is given {len(texts)} times", " ".join(texts), ",".join(texts))
+                raise BadRequest(
+                    f"{option.names[0]}: given {len(texts)} times", remedy=f"Write {option.names[0]} {','.join(texts)}."
+                )
         read = {
             each: [each.read("--" if value == [] else value) for value in given[each.name]]
             for each in self.options
             if each.name in given
         }
         if plain:
-            raise BadRequest(f"{self.name} takes no more arguments", " ".join(plain), f"what {self.path} -h lists")
+            raise BadRequest(f"{' '.join(plain)}: unexpected argument", remedy=f"See {self.path} -h.")
         missing = [each.shown for each in self.options if each.default is NEEDED and each not in read]
         if missing:
-            raise BadRequest(f"{self.name} needs {' and '.join(missing)}")
+            raise BadRequest(f"{self.name}: {' and '.join(missing)} missing", remedy=f"See {self.path} -h.")
         return {
             each.name: each.default if each not in read else read[each] if each.several else read[each][-1]
             for each in self.options
         }
 
     def help_text(self) -> str:
-        """Usage, what it does, arguments, groups of options, examples."""
+        """Return the help: usage, summary, arguments, groups of options, examples."""
         arguments = [each for each in self.options if each.argument]
         needed = [each.shown.split(", ")[-1] for each in self.options if each.default is NEEDED and not each.argument]
         parts = [
@@ -134,7 +137,7 @@ class DeclaredCommand:
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Commands under one name; ``version`` is what ``--version`` prints."""
+    """Group of commands under one name; ``version`` is printed by ``--version``."""
 
     path: str
     help: str
@@ -143,16 +146,16 @@ class Group:
     examples: Sequence[str] = ()
 
     def main(self, words: Sequence[str]) -> None:
-        """Run the command that the first word names on those after it; without one show the help."""
+        """Run the command named by the first word; without one show the help."""
         name, *rest = words or HELP
         if name in HELP:
             say(self.help_text(), paint=paint_help)
         elif name == "--version" and self.version is not None:
             say(f"{self.path} {self.version()}")
         elif name.startswith("-"):
-            raise BadRequest("no such option", name, [*HELP, *["--version"] * (self.version is not None)])
+            raise BadRequest("unknown option", name, [*HELP, *["--version"] * (self.version is not None)])
         elif name not in self.commands:
-            raise BadRequest("no such command", name, tuple(self.commands))
+            raise BadRequest("unknown command", name, tuple(self.commands))
         else:
             found = self.commands[name]
             if isinstance(found, Group):
@@ -161,7 +164,7 @@ class Group:
                 found.main(rest, [each for each in self.commands.values() if isinstance(each, DeclaredCommand)])
 
     def help_text(self) -> str:
-        """A row a command."""
+        """Return the help: a row per command."""
         version = [] if self.version is None else [("--version", "Print the version.")]
         return "\n\n".join(
             [
@@ -182,17 +185,17 @@ def add_command(
     examples: Sequence[str] = (),
     record: Any = None,
 ) -> None:
-    """Add a command; the examples follow its name in its help."""
+    """Add a command with its examples."""
     group.commands[name] = DeclaredCommand(f"{group.path} {name}", help, options, run, examples, record)
 
 
 def _examples(path: str, examples: Sequence[str]) -> list[str]:
-    """What follows a command's name, a line each; none where there are none."""
+    """Return the section of examples, empty without examples."""
     return ["\n".join(["Examples:", *(f"  {path} {each}" for each in examples)])] if examples else []
 
 
 def _width() -> int:
-    """Columns of a help."""
+    """Return the width of a help in columns."""
     return max(min(shutil.get_terminal_size().columns, 100) - 2, 50)
 
 
@@ -208,7 +211,7 @@ def _head(path: str, words: Sequence[str], help: str) -> tuple[str, str]:
 
 
 def _section(title: str, rows: Sequence[tuple[str, str]]) -> list[str]:
-    """A title and its rows, the second column below each other; none where there are no rows."""
+    """Return a title with its aligned rows, empty without rows."""
     if not rows:
         return []
     column = min(max(len(name) for name, _ in rows), 30) + 2

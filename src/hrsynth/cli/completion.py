@@ -1,4 +1,4 @@
-"""Completion for bash, zsh and fish: a script that asks the command line itself, which answers from its tables."""
+"""Completion for bash, zsh and fish: scripts that call ``hrsynth completion words``."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .options import shipped_names
 
 EXAMPLE = "example:"
 WORDS = "words"
-"""What a script asks for instead of the name of a shell, followed by the words typed so far."""
+"""Argument of the scripts in place of a shell's name, followed by the words typed so far."""
 SCRIPTS = {
     "bash": """_hrsynth() {
     local typed last IFS=$' \\t\\n'
@@ -42,7 +42,7 @@ complete -c hrsynth -a '(__hrsynth_words)'""",
 
 
 def candidates(root: Any, typed: Sequence[str]) -> list[str]:
-    """What can stand in the place of the last word that was typed (it may be empty), after the words before it."""
+    """Return completions of the last typed word, which may be empty."""
     *before, last = typed or [""]
     command, used = root, 0
     while used < len(before) and before[used] in getattr(command, "commands", {}):
@@ -51,7 +51,7 @@ def candidates(root: Any, typed: Sequence[str]) -> list[str]:
 
 
 def _next(command: Any, before: Sequence[str], last: str) -> Iterable[str]:
-    """The commands of a group; the values of the option before, the options, or the values of the argument."""
+    """Return commands of a group, values of the option before, options, or values of the argument."""
     if hasattr(command, "commands"):
         return ["--help", "--version"] if last.startswith("-") else list(command.commands)
     options: Sequence[Option] = command.options
@@ -65,7 +65,7 @@ def _next(command: Any, before: Sequence[str], last: str) -> Iterable[str]:
 
 
 def _words(option: Option, last: str) -> Iterable[str]:
-    """Its values; of robots also ``example:NAME``, once that is begun."""
+    """Return the values of an option; for robots also ``example:NAME``, once begun."""
     words = option.words() if callable(option.words) else option.words
     if option.words is shipped_names and last and EXAMPLE.startswith(last[: len(EXAMPLE)]):
         from ..description import list_examples
@@ -75,10 +75,10 @@ def _words(option: Option, last: str) -> Iterable[str]:
 
 
 def add(app: Group) -> None:
-    """Make it a command."""
+    """Register the command."""
 
     def completion(shell: str, typed: list[str] | None) -> None:
-        """Print a shell's script, or (asked by that) the words that can follow."""
+        """Print a shell's script, or for that script the possible words."""
         from ..errors import BadRequest
 
         if shell == WORDS:
@@ -87,15 +87,15 @@ def add(app: Group) -> None:
         elif shell in SCRIPTS:
             say(SCRIPTS[shell])
         else:
-            raise BadRequest("no completion for the shell", shell, tuple(SCRIPTS))
+            raise BadRequest("unknown shell", shell, tuple(SCRIPTS))
 
     add_command(
         app,
         "completion",
-        "Completion of commands, options and robots: a script for bash, zsh or fish.",
+        "Print a completion script of commands, options and robots for bash, zsh or fish.",
         (
             Option("shell", "bash, zsh or fish.", "SHELL", default=NEEDED, argument=True, words=tuple(SCRIPTS)),
-            Option("typed", "What was typed so far (used by the scripts).", "[WORD]...", list[str], argument=True),
+            Option("typed", "Words typed so far (used by the scripts).", "[WORD]...", list[str], argument=True),
         ),
         completion,
         ("bash >> ~/.bashrc", "zsh >> ~/.zshrc", "fish > ~/.config/fish/completions/hrsynth.fish"),

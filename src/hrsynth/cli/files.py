@@ -1,4 +1,4 @@
-"""The commands on files of robots: robots, convert."""
+"""Commands on files: robots, convert, verify."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .progress import Progress
 
 
 class ShippedRobot(TypedDict):
-    """A robot; for a shipped one also what it is, where it is described and with which dimensions."""
+    """A robot; for a shipped one also its architecture, source and dimensions."""
 
     name: str
     file: str
@@ -25,13 +25,13 @@ class ShippedRobot(TypedDict):
 
 
 class Robots(Head):
-    """The robots that come with the package."""
+    """Robots that come with the package."""
 
     robots: list[ShippedRobot]
 
 
 class Convert(OfRobot):
-    """A robot that was written in another dialect, and what was lost."""
+    """A robot that was written in another format, with warnings of content left out."""
 
     file: str
     files: list[str]
@@ -41,7 +41,7 @@ class Convert(OfRobot):
 
 
 class Verify(Head):
-    """A certificate that was accepted, and what it proves."""
+    """An accepted certificate, and what it proves."""
 
     robot: NotRequired[str]
     platform: NotRequired[Platform]
@@ -51,7 +51,7 @@ class Verify(Head):
 
 
 def robots(examples: bool, json: bool) -> None:
-    """Print the table of the shipped robots, or of those of the package example-robot-data."""
+    """Print a table of the shipped robots, or of those of the package example-robot-data."""
     from ..description import list_examples as found
     from ..description import list_robots
     from ..families.table import ROBOTS
@@ -100,14 +100,15 @@ def robots(examples: bool, json: bool) -> None:
 
 
 def convert(target: str | None, output: str | None, to: str | None, meshes: str, json: bool, **source: Any) -> None:
-    """Write a robot in another dialect."""
+    """Write a robot in another format."""
     from ..description import save, targets
     from ..description.files import require_other
     from ..errors import BadRequest
     from ..present.show import record
 
     if (target is None) is (output is None):
-        raise BadRequest("convert writes one file", f"{target} and {output}" if target else None, "OUT, or -o OUT")
+        problem = f"convert: two outputs, {target} and {output}" if target else "convert: OUT missing"
+        raise BadRequest(problem, remedy="Give OUT or -o OUT.")
     target = str(target or output)
     files, name = [str(file) for file in targets(target, to)], source["robot"]
     with Progress():
@@ -128,12 +129,12 @@ def convert(target: str | None, output: str | None, to: str | None, meshes: str,
         record("convert", mechanism, fields)
         if json
         else f"{mechanism.name} with {fields['links']} links and {fields['joints']} joints, platform "
-        f"{mechanism.platform_words}, is written to {' and '.join(files)}."
+        f"{mechanism.platform_words}, written to {' and '.join(files)}."
     )
 
 
 def verify(certificate: str, robot: str | None, json: bool) -> None:
-    """Check a certificate by its own arithmetic."""
+    """Check a certificate with integers and fractions only."""
     from ..certificates import verify as checked
     from ..description import load
     from ..present.show import record
@@ -145,13 +146,13 @@ def verify(certificate: str, robot: str | None, json: bool) -> None:
 
 
 def add(app: Group) -> None:
-    """Make them commands."""
+    """Register the commands."""
     add_command(
         app,
         "verify",
         "Check a certificate of modes, derive or path, using only integers and fractions.",
         (
-            Option("certificate", "The certificate's file.", "FILE", default=NEEDED, argument=True),
+            Option("certificate", "Certificate file.", "FILE", default=NEEDED, argument=True),
             Option("robot", "Check that its geometry is that of this robot.", "ROBOT", words=options.shipped_names),
             JSON,
         ),
@@ -162,8 +163,11 @@ def add(app: Group) -> None:
     add_command(
         app,
         "robots",
-        "The shipped robots.",
-        (flag("examples", "The robots of the package example-robot-data instead: legged robots, arms, hands."), JSON),
+        "List the shipped robots.",
+        (
+            flag("examples", "List the robots of the package example-robot-data instead: legged robots, arms, hands."),
+            JSON,
+        ),
         robots,
         ("", "--examples"),
         Robots,
@@ -171,11 +175,11 @@ def add(app: Group) -> None:
     add_command(
         app,
         "convert",
-        "Read a robot in any dialect and write it in another: .urdf native, .yaml Gepetto, "
+        "Read a robot in any format and write it in another: .urdf native, .yaml Gepetto, "
         ".xml MJCF, .sdf SDFormat, .usda, .usd or .usdc USD.",
         (
             *SOURCE,
-            Option("target", "The file to write; its extension selects the dialect.", "[OUT]", argument=True),
+            Option("target", "The file to write; its extension selects the format.", "[OUT]", argument=True),
             output("The file to write, given as an option."),
             Option(
                 "meshes",
@@ -187,7 +191,7 @@ def add(app: Group) -> None:
             Option(
                 "to",
                 "native, gepetto, mjcf, sdf or usd, whatever the extension.",
-                "DIALECT",
+                "FORMAT",
                 words=("native", "gepetto", "mjcf", "sdf", "usd"),
             ),
             JSON,

@@ -1,4 +1,4 @@
-"""The guided reader: shows what a file says and leaves open, asks what is missing, writes the native file."""
+"""Command import: a dialog that shows a file, requests what is missing and writes the native file."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 SHOWN = 20
-"""Choices that are listed; others are named."""
+"""Largest number of listed choices; others are entered by name."""
 
 
 class Import(OfRobot):
-    """A robot that was read with answers or guesses and written, and the command that does the same without
-    questions."""
+    """A robot that was read with overrides or assumptions and written, and the command that does the same without a
+    dialog."""
 
     file: str
     repeat: str
@@ -42,7 +42,7 @@ class Import(OfRobot):
 
 
 def importing(target: str, observe: str | None, yes: bool, view: bool, json: bool, **source: Any) -> None:
-    """Read a robot with what is answered or guessed, and write it."""
+    """Read a robot with overrides or assumptions, and write it."""
     from ..description import file_of, save
     from ..description.files import require_other, require_writable
     from ..errors import BadRequest
@@ -50,7 +50,9 @@ def importing(target: str, observe: str | None, yes: bool, view: bool, json: boo
 
     path = file_of(source["robot"])
     if Path(target).suffix.lower() != ".urdf":
-        raise BadRequest("import writes the native dialect", target, "a file .urdf; hrsynth convert writes others")
+        raise BadRequest(
+            f"--output {target}: not a .urdf file", remedy="Name a .urdf file; hrsynth convert writes other formats."
+        )
     require_writable(target)
     require_other(target, path)
     asking = not (yes or json) and sys.stdin.isatty() and sys.stdout.isatty()
@@ -64,8 +66,7 @@ def importing(target: str, observe: str | None, yes: bool, view: bool, json: boo
     notes = [str(note) for note in mechanism.notes]
     if not motors:
         notes.append(
-            "open: no joint is driven, so nothing can be said about the real robot's motors "
-            "(--motors JOINTS names the driven ones)"
+            "open: no joint is actuated, so results that need motors are not available. Name them with --motors JOINTS."
         )
         if not asking:
             warn(notes[-1])
@@ -88,12 +89,12 @@ def importing(target: str, observe: str | None, yes: bool, view: bool, json: boo
     else:
         say(
             f"{mechanism.name} with {len(mechanism.links)} links and {len(mechanism.joints)} joints, platform "
-            f"{mechanism.platform_words}, is written to {target}.\nThe same without questions: {again}"
+            f"{mechanism.platform_words}, written to {target}.\nSame without dialog: {again}"
         )
 
 
 def repeat_command(source: dict[str, Any], observe: str | None, target: str) -> str:
-    """The command line that writes the same file without questions."""
+    """Return the command line that writes the same file without a dialog."""
     words = ["hrsynth", "import", source["robot"]]
     words += [word for option in SOURCE[1:] for word in option.typed(source[option.name])]
     words += ["--observe", observe] if observe else []
@@ -101,7 +102,7 @@ def repeat_command(source: dict[str, Any], observe: str | None, target: str) -> 
 
 
 def _read(source: dict[str, Any], observe: str | None, *, tell: bool) -> Mechanism:
-    """The mechanism that the answers give; ``tell`` its notes."""
+    """Read the mechanism with the overrides; ``tell``: print its notes."""
     from ..description.overrides import names, observe_links
 
     mechanism = (robot_of if tell else quiet_robot_of)(dict(source))
@@ -110,7 +111,7 @@ def _read(source: dict[str, Any], observe: str | None, *, tell: bool) -> Mechani
 
 
 def _segments(mechanism: Mechanism) -> dict[str, Observation]:
-    """The observed segment of each leg that has one."""
+    """Return the observed segment of each leg that has one."""
     from ..errors import HrsynthError
     from ..mechanism.legs import decompose
     from ..mechanism.normal import normal_form
@@ -125,7 +126,7 @@ def _segments(mechanism: Mechanism) -> dict[str, Observation]:
 def _ask_all(
     path: Path, source: dict[str, Any], observe: str | None, target: str, view: bool
 ) -> tuple[dict[str, Any], str | None]:
-    """The questions, until the answers are confirmed; ends the command where they are given up."""
+    """Run the dialog until its answers are confirmed; end the command if it is cancelled."""
     status = 0
     try:
         while True:
@@ -138,19 +139,19 @@ def _ask_all(
     except (EOFError, KeyboardInterrupt) as error:
         say("")
         status = 2 if isinstance(error, EOFError) else 130
-    warn("nothing is written")
+    warn("nothing written")
     raise SystemExit(status)
 
 
 class _Dialog:
-    """One round of questions: closures, base, platform, motors, segments, and whether that is right."""
+    """One round of the dialog: closures, base, platform, motors, segments, confirmation."""
 
     def __init__(self, path: Path, source: dict[str, Any], observe: str | None, target: str) -> None:
         self.path, self.source, self.observe, self.target = path, source, observe, target
         self.asked = any(source[name] in (None, []) for name in ("close", "base", "platform", "motors"))
 
     def ask(self, view: bool) -> bool | None:
-        """Whether to write: None to be asked all again."""
+        """Return True to write, False to stop, None to repeat the dialog."""
         found = self._choices()
         self._show_file(found)
         if view:
@@ -174,7 +175,7 @@ class _Dialog:
         return self._confirm()
 
     def _choices(self) -> ImportChoices:
-        """What the file leaves open after the answers up to now."""
+        """Return the open choices of the file with the answers so far."""
         from ..description.assembly.choices import choices
         from ..description.overrides import Overrides, names
 
@@ -193,7 +194,7 @@ class _Dialog:
             )
 
     def _mechanism(self) -> Mechanism | None:
-        """The robot as answered; what is wrong is said, and there is none."""
+        """Read the robot with the answers; print errors and return None if that fails."""
         from ..errors import HrsynthError
 
         try:
@@ -202,7 +203,7 @@ class _Dialog:
         except HrsynthError as error:
             if not self.asked:
                 raise
-            say("\n".join(["", *error.lines(), "This cannot be read that way; here are the questions again.", ""]))
+            say("\n".join(["", *error.lines(), "The file cannot be read this way. Answer again.", ""]))
             return None
 
     def _show_file(self, found: ImportChoices) -> None:
@@ -215,14 +216,14 @@ class _Dialog:
             say(f"  {note}")
 
     def _ask_closures(self, found: ImportChoices) -> None:
-        """Frames to join, on top of what the file closes."""
+        """Request loop closures besides those of the file."""
         from ..description.overrides import closures
 
         closing, near = found.closing, found.candidates
         say(f"\nLoops: {len(closing) or 'none'} closed by the file")
         _list([f"{joint.name}: {joint.links[0]} to {joint.links[1]}, {_word(joint)}" for joint in closing], "-")
         if near:
-            say("Frames that lie near to each other, and could be held together:")
+            say("Candidates for closures (frames near each other):")
             _list([str(each) for each in near])
         elif closing:
             return
@@ -240,7 +241,7 @@ class _Dialog:
             return wishes
 
         self.source["close"] = _answer(
-            "Which are to be closed? Numbers, 2:revolute for a hinge about z, A:B[:TYPE] or A@x,y,z:B for others",
+            "Close which? Numbers, 2:revolute for a revolute joint about z, A:B[:TYPE] or A@x,y,z:B for others",
             "none",
             lambda text: [] if text == "none" else chosen(text),
         )
@@ -248,23 +249,23 @@ class _Dialog:
     def _ask_base(self, found: ImportChoices) -> None:
         say(
             f"\nBase: {found.bases[0]}"
-            + (f", of {len(found.bases)} that no joint carries" if len(found.bases) > 1 else "")
+            + (f", one of {len(found.bases)} links without parent" if len(found.bases) > 1 else "")
         )
         if len(found.bases) > 1:
             _list(found.bases)
         name = _answer(
-            "All of the robot, or only what lies between a link and the platform? Its name or number",
+            "Use the whole robot, or only the links between another base and the platform? Name or number",
             "all",
             lambda text: text if text == "all" else _one(text, found.bases, found.links),
         )
         self.source["base"] = None if name == "all" else name
 
     def _ask_platform(self, found: ImportChoices) -> None:
-        why = found.why or "says the file"
-        say(f"\nPlatform: {found.platforms[0]}, {why}" if found.told else "\nPlatform: several could be")
+        why = found.why or "named by the file"
+        say(f"\nPlatform: {found.platforms[0]}, {why}" if found.told else "\nPlatform: several candidates")
         _list(found.platforms)
         name = _answer(
-            "Which link is the platform? A number or a name",
+            "Which link is the platform? Number or name",
             found.platforms[0] if found.told else None,
             lambda text: _one(text, found.platforms, found.links),
             self._view,
@@ -275,16 +276,16 @@ class _Dialog:
     def _ask_motors(self, found: ImportChoices) -> None:
         joints = found.moving
         driven = [joint.name for joint in joints if joint.motor is not None]
-        say(f"\nMotors: {', '.join(driven) or 'none is told'}")
-        _list([f"{joint.name} ({_word(joint)}){', driven' if joint.motor is not None else ''}" for joint in joints])
+        say(f"\nMotors: {', '.join(driven) or 'none named'}")
+        _list([f"{joint.name} ({_word(joint)}){', actuated' if joint.motor is not None else ''}" for joint in joints])
 
         def chosen(text: str) -> str:
             named = [joint.name for joint in joints]
             return ",".join(dict.fromkeys(_one(word, named, named) for word in _words(text)))
 
-        as_told = "as told" if driven else "none"
+        as_told = "as in the file" if driven else "none"
         answer = _answer(
-            "Which joints are driven? Numbers or names, with commas between",
+            "Which joints are actuated? Numbers or names, with commas between",
             as_told,
             lambda text: text if text == as_told else chosen(text),
             self._view,
@@ -295,8 +296,8 @@ class _Dialog:
         points = [joint.point for joint in mechanism.joints.values()]
         span = max((float(abs(one - other).max()) for one in points for other in points), default=0.0)
         say(
-            f"\nRead: {mechanism.headline()}; base {mechanism.base}, platform {mechanism.platform}; its joints "
-            f"span {span:.4g} m"
+            f"\nRead: {mechanism.headline()}; base {mechanism.base}, platform {mechanism.platform}; joint span "
+            f"{span:.4g} m"
         )
         for note in mechanism.notes:
             say(f"  {note}")
@@ -309,8 +310,8 @@ class _Dialog:
                 raise ValueError(", ".join(UNITS))
             return text
 
-        say(f"\nLengths: the robot's characteristic length would be {mechanism.length:.3g} m")
-        unit = _answer(f"In which unit is the file? {', '.join(UNITS)}", "m", meant)
+        say(f"\nLengths: characteristic length {mechanism.length:.3g} m if the file is in metres")
+        unit = _answer(f"Unit of the file? {', '.join(UNITS)}", "m", meant)
         self.source["unit"] = None if unit == "m" else unit
         return mechanism if unit == "m" else self._mechanism() or mechanism
 
@@ -320,7 +321,7 @@ class _Dialog:
             "\nObserved: "
             + (
                 "; ".join(f"leg {leg} at {seen.link}" for leg, seen in segments.items())
-                or "no leg has a segment that could be watched"
+                or "no leg has an observable segment"
             )
         )
         if not segments:
@@ -328,16 +329,16 @@ class _Dialog:
         from ..description.overrides import observe_links
 
         def chosen(text: str) -> str | None:
-            if text == "so":
+            if text == "these":
                 return None
             named = [_one(word, (), mechanism.links) for word in _words(text)]
             observe_links(mechanism, named)
             return ",".join(named)
 
-        return _answer("Watch these, or other links? Names, with commas between", "so", chosen)
+        return _answer("Observe these, or other links? Names, with commas between", "these", chosen)
 
     def _confirm(self) -> bool | None:
-        there = " (it already exists and will be replaced)" if Path(self.target).exists() else ""
+        there = " (existing file, will be replaced)" if Path(self.target).exists() else ""
 
         def meant(text: str) -> bool | None:
             words = {"yes": True, "y": True, "no": False, "n": False, "again": None, "a": None}
@@ -348,7 +349,7 @@ class _Dialog:
         return _answer(f"\nWrite {self.target}{there}? yes, no, again", "yes", meant, self._view)
 
     def _view(self) -> None:
-        """The robot as it stands, in the browser."""
+        """Show the robot with the answers so far in the browser."""
         import tempfile
         import webbrowser
 
@@ -360,18 +361,18 @@ class _Dialog:
                 page = Path(tempfile.mkdtemp(prefix="hrsynth-"), "robot.html")
                 view(_read(self.source, self.observe, tell=False)).save(page)
         except HrsynthError as error:
-            say(f"No picture yet: {error.lines()[0]}")
+            say(f"No figure yet: {error.lines()[0]}")
             return
-        say(f"The robot is drawn in {page}")
+        say(f"Robot drawn in {page}")
         webbrowser.open(page.as_uri())
 
 
 def _answer(question: str, default: str | None, meant: Callable[[str], T], view: Callable[[], None] | None = None) -> T:
-    """What an answer means, the default for an empty one; asked again until it means something. Raises ``EOFError``
-    where the input ends."""
+    """Return the meaning of an answer, of the default if it is empty; repeat until it is valid. Raises ``EOFError``
+    at the end of input."""
     from ..errors import HrsynthError
 
-    more = ("; v: a picture" if view else "") + ("" if default is None else f" [{default}]")
+    more = ("; v: view" if view else "") + ("" if default is None else f" [{default}]")
     while True:
         text = input(escape_steering(f"{question}{more}: ")).strip()
         if view is not None and text == "v":
@@ -384,37 +385,37 @@ def _answer(question: str, default: str | None, meant: Callable[[str], T], view:
         except HrsynthError as error:
             say(f"  {error.lines()[0]}")
         except ValueError as error:
-            say(f"  {text!r:.60} is not an answer: {error}")
+            say(f"  {text!r:.60}: not a valid answer: {error}")
 
 
 def _words(text: str) -> list[str]:
     words = [word.strip() for word in text.split(",") if word.strip()]
     if not words:
-        raise ValueError("nothing is named")
+        raise ValueError("no name")
     return words
 
 
 def _number(text: str, most: int) -> int:
     number = int(text) if len(text) < 6 else 0
     if not 1 <= number <= most:
-        raise ValueError(f"numbers go from 1 to {most}" if most else "there are no numbers to choose from")
+        raise ValueError(f"numbers go from 1 to {most}" if most else "no numbers to choose from")
     return number
 
 
 def _one(text: str, listed: Sequence[str], named: Iterable[str]) -> str:
-    """The choice of that name or number."""
+    """Return the choice of a name or number."""
     if text in named or text in listed:
         return text
     if text.isdecimal():
         return listed[_number(text, len(listed)) - 1]
-    raise ValueError("there is no such name")
+    raise ValueError("unknown name")
 
 
 def _list(lines: Sequence[str], mark: str | None = None) -> None:
     for number, line in enumerate(lines[:SHOWN], 1):
         say(f"  {mark or number:>2}  {line}")
     if len(lines) > SHOWN:
-        say(f"      and {len(lines) - SHOWN} more, which can be named")
+        say(f"      and {len(lines) - SHOWN} more, by name")
 
 
 def _word(joint: Any) -> str:
@@ -422,21 +423,21 @@ def _word(joint: Any) -> str:
 
 
 def add(app: Group) -> None:
-    """Make it a command."""
+    """Register the command."""
     add_command(
         app,
         "import",
-        "A guided reader: shows what a robot's file says and what is guessed, asks for "
-        "closures, base, platform, motors and segments, writes the native file, and prints the command that "
-        "does the same without questions. With --yes, or without a terminal, it accepts and reports guesses.",
+        "Read a foreign file in a dialog: show its content and the assumptions, choose closures, base, platform, "
+        "motors and segments, write the native file, and print the command that does the same without a dialog. "
+        "With --yes, or without a terminal, assumptions are accepted and reported.",
         (
             *SOURCE,
-            Option("observe", "Links to watch, at their default segments.", "LINKS", group=OBSERVATION),
-            flag("yes", "Ask no questions: accept the guesses."),
-            flag("view", "Show the robot in the browser before the questions."),
+            Option("observe", "Links to observe, at their default segments.", "LINKS", group=OBSERVATION),
+            flag("yes", "No dialog: accept the assumptions."),
+            flag("view", "Show the robot in the browser before the dialog."),
             Option(
                 "target",
-                "The file to write, in the native dialect.",
+                "The file to write, in the native format.",
                 "FILE",
                 default=NEEDED,
                 flags=("-o", "--output"),
@@ -445,6 +446,6 @@ def add(app: Group) -> None:
             JSON,
         ),
         importing,
-        ("leg.xml -o leg.urdf", "leg.urdf --close heel:toe:revolute --platform foot --yes -o own.urdf"),
+        ("leg.xml -o leg.urdf", "leg.urdf --close heel:toe:revolute --platform sole --yes -o own.urdf"),
         Import,
     )

@@ -1,4 +1,4 @@
-"""The command lint: findings in the format that is asked for, and an exit status for continuous integration."""
+"""Command lint: findings in the chosen format, and an exit status for continuous integration."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ FAILING = ("error", "warning", "note", "nothing")
 
 
 def rules() -> Iterable[str]:
-    """The names of the rules."""
+    """Return the names of the rules."""
     from ..linting.rules import lint_rules
 
     return lint_rules()
 
 
 def programs() -> Iterable[str]:
-    """The names of the programs whose reading is known."""
+    """Return the names of the programs whose readers are known."""
     from ..linting.rules.readers import PROGRAMS
 
     return PROGRAMS
@@ -38,7 +38,7 @@ def lint(
     ignore: list[str] | None,
     **given: Any,
 ) -> None:
-    """Print what is found; exit status 1 where it is bad enough."""
+    """Print the findings; exit status 1 if they reach the severity."""
     import hrsynth
 
     from ..errors import BadRequest, BadRobotFile
@@ -49,7 +49,7 @@ def lint(
         if value not in known:
             raise BadRequest(name, value, known)
     if json and format not in ("text", "json"):
-        raise BadRequest("--json together with --format", format, "one of them")
+        raise BadRequest(f"--format {format}: not possible with --json", remedy="Omit one.")
     with Progress():
         given["close"] = given["close"] or ()
         found = hrsynth.lint(files, program=program or (), ignore=ignore or (), **given)
@@ -68,26 +68,26 @@ def lint(
 
 
 def add(app: Group) -> None:
-    """Make it a command."""
+    """Register the command."""
     add_command(
         app,
         "lint",
-        "What is wrong, doubtful or lost in robot files, by named rules, and how to mend it.",
+        "Check robot files by named rules, and fix what can be fixed.",
         (
             Option(
                 "files",
-                "Robot files in any dialect, or names of shipped robots.",
+                "Robot files in any format, or names of shipped robots.",
                 "FILES",
                 list[str],
                 NEEDED,
                 argument=True,
                 words=shipped_names,
             ),
-            flag("fix", "Mend what can be mended in one way only, and overwrite the file or write to --output."),
-            Option("compare", "Another file of the same robot: where the two differ.", "OTHER"),
+            flag("fix", "Apply fixes that are unique; overwrite the file or write to --output."),
+            Option("compare", "Another file of the same robot: list the differences.", "OTHER"),
             Option(
                 "program",
-                "A program that should read the file (mujoco, gazebo …): a closure that it loses is "
+                "A program that should read the file (mujoco, gazebo …): a loop closure that it ignores is "
                 "an error; repeat for more.",
                 "NAME",
                 list[str],
@@ -108,14 +108,14 @@ def add(app: Group) -> None:
                 words=FORMATS,
                 group=OUTPUT,
             ),
-            output("Where to write the mended file, with --fix and a single file."),
+            output("The fixed file, with --fix and a single file."),
             JSON,
             *SOURCE[1:],
         ),
         lint,
         (
             "robot.urdf",
-            "robot.urdf --fix -o mended.urdf",
+            "robot.urdf --fix -o fixed.urdf",
             "robot.urdf --compare robot.xml",
             "a.urdf b.xml --program mujoco --format github --fail-on warning",
         ),

@@ -1,4 +1,4 @@
-"""The options of the command line that belong to no question of their own, and what is told of others."""
+"""Options common to several commands, and notes on the units of others."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def shipped_names() -> Iterable[str]:
-    """The names of the shipped robots."""
+    """Return the names of the shipped robots."""
     from ..description import list_robots
 
     return list_robots()
@@ -25,26 +25,27 @@ JSON = flag("json", "Print the result as one JSON object; its schema: hrsynth sc
 SOURCE = (
     Option(
         "robot",
-        "A robot file in any dialect, a shipped robot's name, or example:NAME.",
+        "A robot file in any format, a shipped robot's name, or example:NAME.",
         "ROBOT",
         default=NEEDED,
         argument=True,
         words=shipped_names,
     ),
-    Option("base", "Consider only what lies between this link and the platform.", "LINK", group=OVERRIDES),
+    Option("base", "The base: consider only the links between it and the platform.", "LINK", group=OVERRIDES),
     Option("platform", "The platform, if the file names none.", "LINK", group=OVERRIDES),
-    Option("motors", "The driven joints, if the file names none.", "JOINTS", group=OVERRIDES),
+    Option("motors", "The actuated joints, if the file names none.", "JOINTS", group=OVERRIDES),
     Option(
         "close",
-        "A closure: the frames of two links, or points A@x,y,z in them, meet (default: in a point); repeat for more.",
+        "A loop closure: frames of two links, or points A@x,y,z in them, that coincide (default: spherical joint); "
+        "repeat for more.",
         "A:B[:TYPE]",
         kind=list[str],
         group=OVERRIDES,
     ),
-    Option("freeze", "Joints to hold at zero.", "JOINTS", default="", group=OVERRIDES),
+    Option("freeze", "Joints to lock at zero.", "JOINTS", default="", group=OVERRIDES),
     Option(
         "keyframe",
-        "Zero pose: a named posture of the file, or of an SRDF file next to it; or FILE.srdf:NAME.",
+        "Zero configuration: a keyframe of the file, or of an SRDF file next to it; or FILE.srdf:NAME.",
         "NAME",
         group=OVERRIDES,
     ),
@@ -57,24 +58,23 @@ SOURCE = (
     ),
     Option(
         "tolerance",
-        "Deviation up to which axes and centres count as parallel, meeting and so on, and are made so "
-        "(characteristic lengths, radians; default: from the digits of the file's numbers).",
+        "Tolerance within which axes and centres are snapped to special geometry "
+        "(characteristic lengths, rad; default: from the decimals of the file's numbers).",
         None,
         float,
         group=OVERRIDES,
     ),
     flag(
         "as_written",
-        "Take the file's numbers as they are: do not correct what is parallel, or meets, up to rounding.",
+        "Use the file's numbers unchanged: do not repair rounded geometry.",
         OVERRIDES,
     ),
 )
-"""A robot as the command line names it, with what its file does not say."""
+"""Robot file and its overrides."""
 
 
 def robot_of(values: dict[str, Any]) -> Mechanism:
-    """The mechanism that the options of ``SOURCE`` name, which are taken out of ``values``; what was guessed or solved
-    goes to standard error, a line each."""
+    """Load the mechanism of the options of ``SOURCE``, removed from ``values``; print assumptions to standard error."""
     mechanism = quiet_robot_of(values)
     for note in mechanism.notes:
         warn(str(note))
@@ -82,22 +82,22 @@ def robot_of(values: dict[str, Any]) -> Mechanism:
 
 
 def quiet_robot_of(values: dict[str, Any]) -> Mechanism:
-    """The same mechanism, of which nothing is told."""
+    """Load the mechanism without printing assumptions."""
     from ..description import load
 
     given = {option.name: values.pop(option.name) for option in SOURCE}
     given["freeze"] = [name for name in given["freeze"].split(",") if name]
-    values["as_written"] = given["as_written"]  # `modes` asks again
+    values["as_written"] = given["as_written"]  # `modes` reads it again
     return load(given.pop("robot"), **{**given, "close": given["close"] or ()})
 
 
 def warn(text: str) -> None:
-    """Say something beside the answer."""
+    """Print a note to standard error."""
     say(f"hrsynth: {text}", err=True)
 
 
 def told_radians(option: str, text: str | None) -> None:
-    """Say how many degrees a small angle is that was given without a unit."""
+    """Print in degrees an angle that was given without a unit."""
     for field in (text or "").split(","):
         try:
             angle = float(field.rpartition("=")[2])
@@ -112,7 +112,7 @@ def told_radians(option: str, text: str | None) -> None:
 
 
 def told_turns(option: str, text: object) -> None:
-    """Say how many degrees a turn of more than half a circle is that was given without a unit."""
+    """Print in degrees a rotation above 180 degrees that was given without a unit."""
     for pose in text if isinstance(text, list) else [text]:
         for field in pose.split(",") if isinstance(pose, str) else ():
             name, _, value = field.partition("=")
@@ -122,10 +122,12 @@ def told_turns(option: str, text: object) -> None:
 
 
 def split_names(text: str) -> list[str]:
-    """Names set apart by commas."""
+    """Split names at commas."""
     from ..errors import BadRequest
 
     names = [name.strip() for name in text.split(",")]
     if not all(names):
-        raise BadRequest("--observe: an empty name", text, "labels or links with commas between them, or all")
+        raise BadRequest(
+            f"--observe {text}: empty name", remedy="Give labels or links with commas between them, or all."
+        )
     return names

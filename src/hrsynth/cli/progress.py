@@ -1,5 +1,5 @@
-"""Progress on standard error: a line that is kept up to date on a terminal, once a second has passed; elsewhere a line
-now and then once half a minute has."""
+"""Progress on standard error: on a terminal a line that is updated after the first second, elsewhere a line after half
+a minute, then at doubled intervals."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from typing import Self
 from .colour import overwrite, say
 
 SPEED_OVER = 600.0
-"""Seconds over which the speed of a build is averaged: words differ much."""
+"""Seconds over which the speed of a build is averaged."""
 SILENT = 30.0
-"""Seconds after which a line is written where there is no terminal; each time as long again as all before."""
+"""Seconds before the first line without a terminal; later lines at doubled times."""
 OFTEN, AGAIN = 0.1, 1.0
-"""Seconds between two writings on a terminal, at least while something is told, and at most."""
+"""Shortest and longest time between two updates on a terminal (s)."""
 BAR = 40
-"""Columns of a bar."""
+"""Width of a bar (columns)."""
 
 
 class Progress:
-    """A line that appears when a command takes long, whether or not that tells anything: what it is at and its steps,
-    whose number nobody knows, or (``counted``) the parts of a build that are there of all, with the time left."""
+    """Progress line of a long command: its stage and number of steps, or with ``counted`` the finished part of a build
+    and the time left."""
 
     def __init__(self, wait: float = 1.0, *, counted: bool = False) -> None:
         self._began = time.monotonic()
@@ -55,11 +55,11 @@ class Progress:
         self._timer.cancel()
 
     def tell(self, what: str) -> None:
-        """One more step done."""
+        """Count one more step of a stage."""
         self._show(what, self._done + 1)
 
     def count(self, part: str, done: int, total: int) -> None:
-        """So many of a part's records are there."""
+        """Set the number of finished entries of a part."""
         self._parts[part] = done, total
         there, self._total = map(sum, zip(*self._parts.values(), strict=True))
         self._known.append((time.monotonic(), there))
@@ -79,7 +79,7 @@ class Progress:
         self._timer.daemon = True
 
     def _again(self) -> None:
-        """Write what it is at, and when it is to be written again."""
+        """Write the line, and schedule the next one."""
         with self._lock:
             if self._start == float("inf"):
                 return

@@ -1,4 +1,4 @@
-"""The JSON schema of each command's record, made of the type of its answer."""
+"""JSON schema of each command, from the type of its result."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from .colour import say
 from .commands import DeclaredCommand, Group, add_command
 
 INTRODUCTION = """What every command prints with `--json`: one object. `hrsynth schema COMMAND` prints its JSON
-schema, and this page shows all of them. They are made of what each result says of its values.
+schema, and this page shows all of them. They are generated from the result classes.
 
-Lengths are metres and angles radians unless a name says otherwise (`_mm`, `_deg`). `null` stands for what is
-absent or not decided. Arrays over a grid are nested in the order of its `axes`.
+Lengths are metres and angles radians unless a name ends in another unit (`_mm`, `_deg`). `null` means absent or not
+decided. Arrays over a grid are nested in the order of its `axes`.
 """
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def schema(command: str) -> dict[str, Any]:
-    """The schema of a command's record; raises ``KeyError`` for a command that has none."""
+    """Return the schema of a command; raises ``KeyError`` for a command without JSON."""
     parts: dict[str, Any] = {}
     kind = commands()[command].record
     files: tuple[File, ...] = ()
@@ -48,14 +48,14 @@ def schema(command: str) -> dict[str, Any]:
 
 
 def commands() -> dict[str, DeclaredCommand]:
-    """The commands that print JSON, by what follows ``hrsynth``."""
+    """Return the commands that print JSON, by name."""
     every: list[Any] = [*app.commands.values()]
     leaves = [each for group in every for each in getattr(group, "commands", {"": group}).values()]
     return {each.name: each for each in leaves if any(option.name == "json" for option in each.options)}
 
 
 def page() -> str:
-    """The page of all schemas, in Markdown."""
+    """Return the page of all schemas, in Markdown."""
     blocks = ["# The JSON of every command", INTRODUCTION]
     for command in commands():
         lines = javascript.dumps(schema(command), ensure_ascii=False, indent=1).splitlines()
@@ -65,7 +65,7 @@ def page() -> str:
 
 
 def add(app: Group) -> None:
-    """Make it a command."""
+    """Register the command."""
 
     def told(command: list[str]) -> None:
         """Print a command's schema."""
@@ -74,9 +74,9 @@ def add(app: Group) -> None:
         name = " ".join(command)
         if name not in commands():
             what = (
-                "this command prints no JSON"
+                "command without JSON"
                 if name in app.commands and not isinstance(app.commands[name], Group)
-                else "no record of the command"
+                else "unknown command"
             )
             raise BadRequest(what, name, tuple(commands()))
         say(javascript.dumps(schema(name), ensure_ascii=False, indent=2))
@@ -84,7 +84,7 @@ def add(app: Group) -> None:
     add_command(
         app,
         "schema",
-        "The JSON schema of what a command prints with --json.",
+        "Print the JSON schema of a command's --json.",
         (
             Option(
                 "command",

@@ -1,4 +1,4 @@
-"""The page to work in: the server is started, its address told, and it ends with Ctrl-C."""
+"""Command studio: start the server, print its address, stop it with Ctrl-C."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def studio(robot: str | None, observe: str | None, camera: str | None, port: int
 
 
 def serve(server: StudioServer, what: str) -> None:
-    """Tell where the page is, and wait until Ctrl-C or the end of the terminal; nothing is left then."""
+    """Print the address of the page, and wait until Ctrl-C or the end of the terminal; then stop the server."""
 
     def end(*_: Any) -> None:
         raise KeyboardInterrupt
@@ -45,21 +45,21 @@ def serve(server: StudioServer, what: str) -> None:
 
 
 def add(app: Group) -> None:
-    """Make it a command."""
+    """Register the command."""
     add_command(
         app,
         "studio",
-        "An interactive page in the browser: a robot, a folder of robots or files that are "
-        "dropped in, with hidden robot, modes, accuracy and runs, live.",
+        "Open an interactive page in the browser: a robot, a folder of robots or dropped files, "
+        "with hidden robot, modes, accuracy and runs.",
         (
             Option(
                 "robot",
-                "A robot file in any dialect, a shipped robot's name, example:NAME, or a folder.",
+                "A robot file in any format, a shipped robot's name, example:NAME, or a folder.",
                 "[ROBOT|FOLDER]",
                 argument=True,
                 words=shipped_names,
             ),
-            Option("observe", "Legs to watch (1,4), links, or all (default: all).", "LEGS", group=OBSERVATION),
+            Option("observe", "Legs to observe (1,4), links, or all (default: all).", "LEGS", group=OBSERVATION),
             Option("camera", "The link that carries the camera.", "LINK", group=OBSERVATION),
             PORT,
             Option("browser", "Open the page in the browser.", None, bool, True, ("--browser/--no-browser",)),

@@ -127,12 +127,11 @@ def require_closed(robot: str, loops: Sequence[tuple[JointSpec, Array, Array]], 
             misses[worst],
             SAME_GEOMETRY,
             joint.name,
-            "; ".join(filter(None, [cure(misses[worst]), "`hrsynth lint` searches for poses at which it closes"])),
+            f"{cure(misses[worst])} Run hrsynth lint to find where it closes.".strip(),
         )
 
 
 def cure(opening: float) -> str:
-    """Return the option that may close loops with this residual (characteristic lengths, radians); nothing for a large
-    one."""
+    """Return the remedy for loops with a closure residual (characteristic lengths, rad); empty if it is large."""
     tolerance = 10.0 ** np.ceil(np.log10(max(opening, EXACT)))
-    return f"if its numbers are rounded: --tolerance {tolerance:g}" if tolerance < LARGEST_NOISE else ""
+    return f"Use --tolerance {tolerance:g} if its numbers are rounded." if tolerance < LARGEST_NOISE else ""

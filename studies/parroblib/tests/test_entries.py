@@ -63,7 +63,7 @@ def test_the_command_line(tables: Path, tmp_path: Path, capsys: pytest.CaptureFi
     capsys.readouterr()
     assert execute(["catalog", "list", "--catalog", str(kept), "--verdict", "controllable", "--json"]) == 0
     (entry,) = json.loads(capsys.readouterr().out)["entries"]
-    assert (entry["word"], entry["hidden"], entry["group"]) == ("P3RRR1G1P1", "3-PiR*R", "2T1R")
+    assert (entry["key"], entry["hidden"], entry["group"]) == ("P3RRR1G1P1", "3-PiR*R", "2T1R")
     assert execute(["catalog", "show", "P3RRR1G1P1", "--catalog", str(kept)]) == 0
     out = capsys.readouterr().out
     assert "choices       joint 1 of each leg: 3" in out

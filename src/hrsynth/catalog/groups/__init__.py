@@ -1,6 +1,6 @@
-"""The groups of the catalog: what is enumerated, each group in a module of its own.
+"""Groups of the catalog, each enumerated in its own module.
 
-A group is a law over words, so that a word alone says where it belongs; what :data:`GROUPS` lists of it is finite.
+A group is a law over keys, so that a key alone determines its group; :data:`GROUPS` lists finitely many of it.
 """
 
 from __future__ import annotations
@@ -38,6 +38,6 @@ def words(name: str) -> list[str]:
 
 
 GROUPS: Mapping[str, Callable[[], list[str]]] = {name: partial(words, name) for name in _LISTED}
-"""The words of each group that watches legs."""
+"""Keys of each group that observes legs."""
 EVERY: Mapping[str, Callable[[], list[str]]] = {**GROUPS, SENSORS: partial(words, SENSORS)}
-"""The words of each group."""
+"""Keys of each group."""

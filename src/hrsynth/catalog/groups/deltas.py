@@ -16,7 +16,7 @@ _ENDS = (["2SS"], ["2US"], ["U", "U"], ["U", "S"])
 
 
 def belongs(word: ArchitectureKey) -> bool:
-    """Whether all legs are an R or a P and then 2SS, 2US, UU or US."""
+    """Return True if all legs are an R or a P and then 2SS, 2US, UU or US."""
     return all(
         leg.joints[0].letter in ("R", "P") and [joint.letter for joint in leg.joints[1:]] in _ENDS for leg in word.legs
     )

@@ -1,8 +1,8 @@
 """Planar robots, complete: the seven chains of three joints R and P, with every motor and every observed segment.
 
-Three legs on a rigid platform move it with three freedoms, two legs that end on one R move a point with two. Special
+Three legs on a rigid platform give it three dof, two legs that end on one R give a point two. Special
 geometry: the rails of all legs that begin with a P are parallel. Parallelograms take the place of P or R joints, with
-every motor where the legs are equal; else each leg is driven at the base, as four legs are, one more than freedoms.
+every motor where the legs are equal; else each leg is driven at the base, as are four legs, one more than the dof.
 """
 
 from __future__ import annotations
@@ -51,8 +51,8 @@ def _kinds(rail: str, motors: int, tip: str = "RP") -> list[LegKey]:
 
 
 def words() -> Iterator[ArchitectureKey]:
-    """Robots with three and with two freedoms, of general geometry and with parallel rails; with one leg more than
-    freedoms."""
+    """Yield robots with three and with two dof, of general geometry and with parallel rails, and with one leg more than
+    dof."""
     for rail in ("h", "x"):
         yield from robots(_kinds(rail, 3), 3)
         yield from robots(_kinds(rail, 2, tip="R"), 2, "point")

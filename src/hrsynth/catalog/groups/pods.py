@@ -10,11 +10,11 @@ from .legs import leg, robots
 KINDS = tuple(map(leg, ("Utn-Pl*-S", "Utn-Pl*-Unt", "Rt-Pl*-S", "S-Pl*-S", "S-Pl*-Rt", "Pr*-Pz-S", "Cr*-Pz-S")))
 """UPS, UPU (parallel outer axes), RPS, SPS, SPR, and PPS, CPS that slide along the radius."""
 UNCONSTRAINED = 6
-"""Freedoms of a leg that constrains nothing."""
+"""Dof of a leg that constrains nothing."""
 
 
 def belongs(word: ArchitectureKey) -> bool:
-    """Whether all legs have three joints, the middle one a P, and end on U, S or R, on one rigid platform."""
+    """Return True if all legs have three joints, the middle one a P, and end on U, S or R, on one rigid platform."""
     return not word.platform and all(
         len(leg.joints) == 3
         and leg.joints[1].letter == "P"
@@ -27,7 +27,7 @@ def belongs(word: ArchitectureKey) -> bool:
 
 
 def words() -> Iterator[ArchitectureKey]:
-    """Robots of three to six legs, alike or mixed, whose legs leave a freedom by their count; and all legs alike."""
+    """Yield robots of three to six legs, alike or mixed, with positive dof by count; and all with equal legs."""
     for count in range(3, 7):
         for word in robots(KINDS, count):
             constraints = sum(max(0, UNCONSTRAINED - each.freedoms) for each in word.legs)

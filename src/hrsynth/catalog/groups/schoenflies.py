@@ -20,7 +20,7 @@ LEGS = 4
 
 
 def belongs(word: ArchitectureKey) -> bool:
-    """Whether four legs of one chain of R, P and U turn about z and horizontal directions of their own alone."""
+    """Return True if four equal legs of R, P and U rotate only about z and horizontal directions of their own."""
     axes = {axis for leg in word.legs for joint in leg.joints if joint.letter != "P" for axis in joint.axes}
     return (
         len(word.legs) == LEGS

@@ -1,5 +1,5 @@
-"""Robots whose platform is seen by cameras on the base or carries an IMU: known architectures, each with several sets
-of what is seen."""
+"""Robots with cameras on the base that observe the platform, or with an IMU: known architectures, each with several
+sets of sensors."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ROBOTS = (
     "3(Rz*-Rz-Rz)",
     "6(Rt*-Utn-S)",
 )
-"""Six freedoms, pods with fewer, deltas with three and four, a planar robot, rods on cranks."""
+"""Six dof, pods with fewer, deltas with three and four, a planar robot, rods on cranks."""
 SEEN = (
     "point",
     "2point",

@@ -1,4 +1,4 @@
-"""Spatial robots with three equal legs and three freedoms, from the literature of type synthesis; legs have up to five
+"""Spatial robots with three equal legs and three dof, from the literature of type synthesis; legs have up to five
 joints.
 
 Translational: all R of a leg have one or two directions, each direction in one piece (the first may return at the
@@ -17,7 +17,7 @@ from ..architecture_key import ArchitectureKey, LegKey
 from .legs import drive_each_joint, leg, watch_each_segment
 
 _SLIDES = "hjk"
-"""Names of a leg's P axes, one after another; more are not needed for three freedoms."""
+"""Names of a leg's P axes, one after another; three dof need no more."""
 CLAVEL = "Rt*-Rt-Pin-Rt"
 """The leg of the Delta robot."""
 
@@ -36,8 +36,8 @@ def translational() -> Iterator[LegKey]:
 
 
 def translates(chain: LegKey) -> bool:
-    """Whether a leg of :func:`translational` moves its end in all translations and turns about each of its directions,
-    and nothing is idle: k parallel R give k - 1 translations, at most two."""
+    """Return True if a leg of :func:`translational` has all translations and a rotation about each of its directions,
+    without internal motion: k parallel R give k - 1 translations, at most two."""
     turning = Counter(joint.axes for joint in chain.joints if joint.letter == "R")
     return len(chain.joints) == 3 + len(turning) and max(turning.values()) <= 3
 

@@ -34,7 +34,7 @@ class Site:
     pages: int
     now: int
     differ: tuple[tuple[str, str], ...]
-    """Words whose derivation, made now, does not end in what the record says, and what it ends in."""
+    """Keys with a derivation that differs from the entry, and its result."""
 
     def to_dict(self) -> dict[str, Any]:
         return {
@@ -42,7 +42,7 @@ class Site:
             "architectures": self.architectures,
             "pages": self.pages,
             "now": self.now,
-            "differ": [{"word": word, "derived": found} for word, found in self.differ],
+            "differ": [{"key": word, "derived": found} for word, found in self.differ],
         }
 
 
@@ -63,7 +63,7 @@ def site(
         Where joblib is not installed.
     """
     if not len(catalog):
-        raise BadRequest("no architectures for a site", 0, "one or more")
+        raise BadRequest("no architecture fits", remedy="Widen the search.")
     team, tell = executor(workers), tell or (lambda *_: None)
     every = structures(catalog)
     differ: list[tuple[str, str]] = []
@@ -90,7 +90,7 @@ def _make_pages(team: Executor, folder: Path, wanted: Sequence[Structure]) -> It
 
 
 def _stamp(every: Iterable[Structure]) -> dict[str, str]:
-    """What a site is made from: the version, its templates, its records."""
+    """Return a digest of a site's sources: version, templates, entries."""
     digest = sha256()
     for kind in ("assets", "templates"):
         files = resources.files("hrsynth.catalog.site").joinpath(kind).iterdir()

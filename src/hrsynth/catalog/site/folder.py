@@ -14,7 +14,7 @@ from ...errors import BadRequest
 from ..store import writable
 
 STAMP = "site.json"
-"""Says that a folder is a site, and of what."""
+"""File that marks a folder as a site, with a digest of its sources."""
 FOLDERS = ("p", "r", "d")
 """Folders of the pages, of the robot files and of the small drawings."""
 OWN = frozenset({STAMP, *FOLDERS, "index.html", "data.js", "index.js", "page.js", "turn.js", "site.css", "report.css"})
@@ -45,15 +45,14 @@ def require_replaceable(site: Path, said: str) -> None:
     if not site.exists():
         return
     if not site.is_dir():
-        raise BadRequest("cannot write the site: not a folder", said, "a new folder, or one that holds a site")
+        raise BadRequest(f"--output {said}: not a folder", remedy="Name a new folder or an older site.")
     with writable(site, "site"):
         found = {each.name for each in site.iterdir()}
     if found and (STAMP not in found or found - OWN):
         other = sorted(found - OWN) or sorted(found)
         raise BadRequest(
-            f"cannot write the site: the folder holds other files ({other[0]} …)",
-            said,
-            "a new or an empty folder, or one that holds a site and nothing else",
+            f"--output {said}: the folder holds other files ({other[0]} …)",
+            remedy="Name a new or empty folder or an older site.",
         )
 
 
@@ -79,9 +78,7 @@ def _prepare(folder: Path, stamp: dict[str, str], anew: bool) -> None:
     other = sorted({each.name for each in folder.iterdir()} - OWN)
     if other:
         raise BadRequest(
-            f"cannot write the site: the folder of its draft holds other files ({other[0]} …)",
-            str(folder),
-            "that folder moved away",
+            f"{folder}: this draft folder holds other files ({other[0]} …)", remedy="Move the folder away."
         )
     for each in folder.iterdir():
         shutil.rmtree(each) if each.is_dir() else each.unlink()

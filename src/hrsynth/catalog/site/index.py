@@ -23,28 +23,28 @@ if TYPE_CHECKING:
     from jinja2 import Environment
     from markupsafe import Markup
 
-TEXTS = ("group", "motion", "verdict", "notation", "hidden", "condition", "cure", "refused")
+TEXTS = ("group", "motion", "verdict", "notation", "hidden", "condition", "suggestion", "refused")
 """Fields with few values: each value once, and which of them a record has."""
-LISTS = ("steps", "lost")
+LISTS = ("steps", "unobserved")
 """The same of fields that are lists, joined."""
 NUMBERS = ("legs", "dof", "rank", "fewest")
 EXPLAINED = {
-    "hidden robot": "The mechanism that a controller moves when a camera watches only the directions of the legs.",
-    "dof": "How many small motions the platform has: 2T1R are two translations and one rotation. Mobility counts the "
-    "motions of all links; idle ones leave the platform at rest.",
-    "verdict": "Controllable: the watched directions show all motions of the platform. Partially controllable: some of "
-    "them. Uncontrollable: none.",
-    "exact": "Whether the verdict is proved in exact arithmetic for the architecture, or for random dimensions.",
-    "legs needed": "The smallest sets of legs that show as much as all legs do.",
+    "hidden robot": "The mechanism that a controller moves when a camera observes only the directions of the legs.",
+    "dof": "Independent motions of the platform: 2T1R are two translations and one rotation. Mobility counts the "
+    "motions of all links; internal ones do not move the platform.",
+    "verdict": "Controllable: the observed directions show all motions of the platform. Partially controllable: some. "
+    "Uncontrollable: none.",
+    "exact": "Whether the verdict is proved in exact arithmetic for the architecture, or holds at random dimensions.",
+    "legs needed": "The smallest sets of legs with the rank of all legs.",
     "hidden robots": "The hidden robot of each of these sets alone, derived in the dimensions of the robot file.",
-    "Type 2": "Where the platform gains a motion that the watched directions do not show.",
-    "modes": "How many poses of the platform have the same watched directions.",
-    "cure": "What to measure as well, so that nothing is lost.",
-    "lost": "Motions of the platform that the watched directions do not show.",
-    "confirmed": "At so many closed configurations the rank was computed as well.",
-    "rules": "The steps from the robot to its hidden robot, with the legs in which they were taken.",
+    "Type 2": "Where the platform gains a motion that the observed directions do not show.",
+    "modes": "Number of platform poses with the same observed directions.",
+    "suggestion": "Further measurements that show all motions.",
+    "unobserved": "Motions of the platform that the observed directions do not show.",
+    "confirmed": "Number of closed configurations at which the rank was computed as well.",
+    "rules": "Steps from the robot to its hidden robot, with their legs.",
 }
-"""What the words of a page mean."""
+"""Explanations of the labels of a page."""
 SCRIPTS = ("site.css", "index.js", "page.js")
 
 
@@ -68,10 +68,10 @@ def columns(structures: Iterable[Structure]) -> dict[str, Any]:
     rows = [(place, record) for place, each in enumerate(structures) for record in each.records]
     found: dict[str, Any] = {"pages": [each.name for each in structures], "page": [place for place, _ in rows]}
     records = [record for _, record in rows]
-    found["word"] = [record["word"] for record in records]
-    found["name"] = [address_name(record["word"]) for record in records]
-    found["order"] = _ranks([(*order(record), record["word"]) for record in records])
-    found["alias"] = _places([alias(record["word"]) for record in records])
+    found["key"] = [record["key"] for record in records]
+    found["name"] = [address_name(record["key"]) for record in records]
+    found["order"] = _ranks([(*order(record), record["key"]) for record in records])
+    found["alias"] = _places([alias(record["key"]) for record in records])
     for field in NUMBERS:
         found[field] = [record.get(field) for record in records]
     found["base"] = [None if "base_motors" not in record else int(record["base_motors"]) for record in records]

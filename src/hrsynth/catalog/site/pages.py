@@ -55,14 +55,14 @@ def _write(folder: Path, structure: Structure, studied: Study) -> None:
     robots: dict[str, Mechanism] = {}
     for record in structure.records:
         try:
-            robot = studied.real(record["word"])
+            robot = studied.real(record["key"])
             content = native.write(robot).encode()
         except HrsynthError:
             continue
         if "refused" not in record:
-            (folder / ROBOTS / f"{address_name(record['word'])}.urdf").write_bytes(content)
-        robots[record["word"]] = robot
-    shown = robots.get(structure.fact["word"])
+            (folder / ROBOTS / f"{address_name(record['key'])}.urdf").write_bytes(content)
+        robots[record["key"]] = robot
+    shown = robots.get(structure.fact["key"])
     drawn = None if shown is None else _portrait(shown, studied)
     if drawn is not None:
         (folder / DRAWINGS / f"{structure.name}.svg").write_text(drawn.svg(*SMALL), encoding="utf-8")
@@ -71,7 +71,7 @@ def _write(folder: Path, structure: Structure, studied: Study) -> None:
 
 
 def _portrait(robot: Mechanism, studied: Study) -> Portrait:
-    """The robot in space, its watched links and the plane in which it moves marked where they are known."""
+    """Draw the robot in space, with its observed links and plane of motion if known."""
     if studied.derivation is None:
         return Portrait.draw(robot, [robot.platform], (), None)
     setup = studied.derivation.setup
@@ -86,7 +86,7 @@ def _portrait(robot: Mechanism, studied: Study) -> Portrait:
 def page(structure: Structure, studied: Study, robots: dict[str, Mechanism], drawn: Portrait | None) -> str:
     """The page; ``robots`` are the mechanisms that are drawn, by word; ``drawn`` is the robot in space."""
     found, record = studied.derivation, structure.fact
-    shown = robots.get(record["word"])
+    shown = robots.get(record["key"])
     known: dict[str, Any] = {"graphs": [], "things": "legs", "real": record.get("notation", ""), "found": None}
     if found is not None:
         known = derivation_parts(found)
@@ -104,12 +104,10 @@ def page(structure: Structure, studied: Study, robots: dict[str, Mechanism], dra
         structure=structure,
         record=record,
         facts=list(facts(record, studied.smallest)),
-        alias=alias(record["word"]),
+        alias=alias(record["key"]),
         rules=list(rules(record)),
         differs=studied.differs,
-        variants=[
-            _variant(each, None if "refused" in each else robots.get(each["word"])) for each in structure.records
-        ],
+        variants=[_variant(each, None if "refused" in each else robots.get(each["key"])) for each in structure.records],
     )
 
 
@@ -123,10 +121,10 @@ def _driven_joints(robot: Mechanism) -> list[str]:
 
 
 def _variant(record: Record, robot: Mechanism | None) -> dict[str, Any]:
-    """What a page says of one architecture: its name, its motors, its file."""
+    """Return the data of one architecture for a page: name, motors, file."""
     return {
-        "name": address_name(record["word"]),
-        "word": record["word"],
+        "name": address_name(record["key"]),
+        "key": record["key"],
         "notation": record.get("notation", ""),
         "motors": motors(record) if "motors" in record else "",
         "joints": [] if robot is None else _driven_joints(robot),
@@ -136,8 +134,8 @@ def _variant(record: Record, robot: Mechanism | None) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """The number of the dimensions, the derivation in these (None: there is none), and what it ends in or why there is
-    none, where the record says otherwise."""
+    """Number of the dimensions, the derivation with these (or None), and its result or error if it differs from the
+    entry."""
 
     attempt: int
     derivation: Derivation | None = None
@@ -160,7 +158,7 @@ def study(record: Record) -> Study:
     if "refused" in record:
         return Study(attempt)
     try:
-        drawn = mechanism(model(parse(record["word"])), attempt)
+        drawn = mechanism(model(parse(record["key"])), attempt)
         found = derive(observe(drawn, samples=SAMPLES), unchecked=False)
     except HrsynthError as error:
         return Study(attempt, differs=str(error).splitlines()[0])
@@ -168,7 +166,7 @@ def study(record: Record) -> Study:
 
 
 def _difference(found: Derivation, record: Record) -> str:
-    """What a derivation ends in, where that is not what the record says."""
+    """Return the result of a derivation if it differs from the entry."""
     hidden = found.hidden_architecture and found.hidden_architecture.ascii
     same = (hidden, found.verdict.verdict, found.verdict.rank) == (
         record.get("hidden"),

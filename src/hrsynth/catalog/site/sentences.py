@@ -1,4 +1,4 @@
-"""What a record says in a few words, in whole sentences: what is to be measured more, what each rule did."""
+"""Sentences on an entry: its plain result, further measurements, the rules applied."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ from ..jsonl import Record
 
 RULES = {
     "motors off": "The motors are set free: the controller moves what the camera measures, not the motors.",
-    "lift": "A virtual chain that constrains nothing is added to {legs}; its driven U joint measures the watched "
+    "lift": "A virtual chain that constrains nothing is added to {legs}; its actuated U joint measures the observed "
     "direction.",
     "anchor locus": "In {legs} the point that carries this U joint moves on a surface or a curve, or is fixed, so that "
     "fewer virtual sliders carry it.",
-    "direction locus": "In {legs} the watched direction turns about one axis or does not turn, so that one driven R "
+    "direction locus": "In {legs} the observed direction rotates about one axis or not at all, so that one actuated R "
     "joint or none measures it.",
-    "takeover": "In {legs} the virtual actuator takes the place of the real joint before the watched segment.",
-    "companion": "In {legs} the rod next to the watched one moves with it.",
+    "takeover": "In {legs} the virtual actuator replaces the real joint before the observed segment.",
+    "companion": "In {legs} the rod parallel to the observed one moves with it.",
     "end change": "In {legs} the last S joint becomes a U joint.",
     "pi form": "In {legs} a planar parallelogram (Π) carries the actuator, for it moves on a circle.",
-    "prismatic merge": "In {legs} the virtual actuator takes the place of the real joint on the base.",
-    "leg removal": "The platform and the watched legs move as before without {legs}: left out.",
-    "keep": "Without {legs} the platform would move otherwise; so much is kept, though nothing is measured there.",
+    "prismatic merge": "In {legs} the virtual actuator replaces the real joint on the base.",
+    "leg removal": "The platform and the observed legs move as before without {legs}, which are removed.",
+    "keep": "Without {legs} the platform would move differently; they are kept as passive legs.",
 }
-"""What each rule did; ``{legs}`` are the legs in which."""
+"""Sentence of each rule; ``{legs}`` are its legs."""
 CONFIRMED = ", confirmed at {confirmed} closed configurations"
 _STEP = re.compile(r"(?P<rule>.*?)(?: (?P<legs>[0-9,]+))?")
 _PART = re.compile(r"(?P<kind>direction|line|encoder) (?P<name>\w+)")
 _PLACE = re.compile(r"(?:link|rod|joint)_(?P<leg>\d+)_(?P<joint>\d+)[ab]?")
 _KINDS = {
     "direction": "the direction of {}",
-    "line": "the direction and the place of {}",
+    "line": "the direction and the position of {}",
     "encoder": "the encoder of {}",
 }
 
@@ -49,32 +49,34 @@ def answer(record: Record) -> Iterator[str]:
     """The plain answer, of an architecture that was not refused."""
     if "refused" in record:
         return
-    if "see" not in record:
+    if "sensors" not in record:
         labels = [str(k + 1) for k in range(record["legs"])]
-        yield shows(labels, "legs", record["rank"], record["dof"], " or ".join(record.get("lost", ())))
+        yield shows(labels, "legs", record["rank"], record["dof"], " or ".join(record.get("unobserved", ())))
     if record.get("minimal"):
-        yield fewest(record["minimal"], "observations" if "see" in record else "legs", record["rank"], record["dof"])
+        yield fewest(
+            record["minimal"], "observations" if "sensors" in record else "legs", record["rank"], record["dof"]
+        )
     if record.get("condition"):
         yield where_lost(record["condition"])
     proof = f"Exact in {record['instances']} instances"
     if record["instances"] == 1:
-        proof = "Proved in exact arithmetic, except for a chance below 1e-9 of what closed loops keep"
+        proof = "Proved in exact arithmetic; loop-invariant incidences hold except with a probability below 1e-9"
     yield f"{proof}{CONFIRMED.format(**record) if 'confirmed' in record else ''}."
     yield from filter(None, [cure(record)])
 
 
 def cure(record: Record) -> str | None:
-    """What to measure as well, so that nothing is lost."""
-    said = record.get("cure")
+    """Return a sentence on further measurements, None if none is needed."""
+    said = record.get("suggestion")
     if not said:
         return None
     if said.startswith("none of"):
-        return "Of the measurements that were tried, up to four at a time, none shows all freedoms."
+        return "No set of up to four further measurements shows all dof."
     parts = [_KINDS[each["kind"]].format(_where(each["name"])) for each in _PART.finditer(said)]
     measured = list_words(parts)
     if said.startswith("not all by"):
-        return f"Measure {measured} as well: that shows more, but not all freedoms."
-    return f"Measure {measured} as well: then all {record['dof']} freedoms are seen."
+        return f"Measure {measured} as well: this shows more, but not all dof."
+    return f"Measure {measured} as well: this shows all {record['dof']} dof."
 
 
 def _legs(labels: str | None) -> str:

@@ -20,7 +20,7 @@ def address_name(word: str) -> str:
     return sha256(word.encode()).hexdigest()[:LENGTH]
 
 
-OF_MOTORS = frozenset({"word", "notation", "motors", "motor_rank", "driven", "base_motors"})
+OF_MOTORS = frozenset({"key", "notation", "motors", "motor_rank", "driven", "base_motors"})
 """Fields of a record that depend on its motors."""
 
 
@@ -45,14 +45,14 @@ class Structure:
 
     def pack(self) -> str:
         """As text that can be sent to another process."""
-        return json.dumps({"word": self.word, "kin": self.kin, "records": [line(each) for each in self.records]})
+        return json.dumps({"key": self.word, "kin": self.kin, "records": [line(each) for each in self.records]})
 
     @classmethod
     def unpack(cls, text: str) -> Structure:
-        """What ``pack`` wrote."""
+        """Decode the text of ``pack``."""
         found: dict[str, Any] = json.loads(text)
         return cls(
-            found["word"],
+            found["key"],
             tuple(json.loads(each) for each in found["records"]),
             tuple((word, verdict) for word, verdict in found["kin"]),
         )
@@ -61,14 +61,14 @@ class Structure:
 def structures(records: Iterable[Record]) -> tuple[Structure, ...]:
     """The structures of records, sorted by word; their records by word too, those with all motors on the base first."""
     alike: dict[str, dict[str, list[Record]]] = {}
-    for each in sorted(records, key=lambda record: (not record.get("base_motors"), record["word"])):
-        common = line({**each, **dict.fromkeys(OF_MOTORS), "word": ""})
-        alike.setdefault(str(parse(each["word"]).unmoved), {}).setdefault(common, []).append(each)
+    for each in sorted(records, key=lambda record: (not record.get("base_motors"), record["key"])):
+        common = line({**each, **dict.fromkeys(OF_MOTORS), "key": ""})
+        alike.setdefault(str(parse(each["key"]).unmoved), {}).setdefault(common, []).append(each)
     own: dict[str, list[Record]] = {}
     alike_unseen: dict[str, list[str]] = {}
     for unmoved, parts in alike.items():
         for part in parts.values():
-            word = part[0]["word"] if unmoved in own else unmoved
+            word = part[0]["key"] if unmoved in own else unmoved
             own[word] = part
             alike_unseen.setdefault(str(parse(unmoved).unmarked), []).append(word)
     kin = {word: words for words in alike_unseen.values() for word in words}

@@ -24,7 +24,7 @@ from .geometry_repair import snap_geometry
 from .loops import LoopAssembly, LoopSolution, Values, regular_values, solve
 from .zero_configuration import moves, with_offsets, with_zero_at
 
-POSTURE = "start near a closed configuration: --keyframe NAME of the file, or FILE.srdf:NAME"
+POSTURE = "Start from a keyframe that nearly closes them: --keyframe NAME, or FILE.srdf:NAME."
 
 
 def build(graph: JointGraph, overrides: Overrides) -> Mechanism:

@@ -36,7 +36,7 @@ def entries(records: Sequence[Record], total: int, groups: Sequence[str] = ()) -
 
 def entry(record: Record, drawn: str, note: str = "", smallest: Sequence[Record] = ()) -> str:
     """Return one entry: its legs drawn, then its data, with the hidden robots of its ``smallest`` sets."""
-    head = f"{record['word']}   {record.get('notation', '')}".rstrip()
+    head = f"{record['key']}   {record.get('notation', '')}".rstrip()
     legs = [f"{drawn}\n{LEGEND}"] if drawn else []
     return "\n\n".join([head, *legs, listing(_all(record, smallest)), *filter(None, [note])])
 
@@ -46,14 +46,14 @@ LISTED: Mapping[str, type] = {
     **dict.fromkeys(("dof", "rank", "fewest"), int),
 }
 """Fields, with types, that every entry of a list has unless it was refused."""
-TOLD: Mapping[str, type] = {**LISTED, "exact": bool, **dict.fromkeys(("mobility", "idle", "instances"), int)}
+TOLD: Mapping[str, type] = {**LISTED, "exact": bool, **dict.fromkeys(("mobility", "internal", "instances"), int)}
 """Fields, with types, of an entry that is shown in full."""
 
 
 def describe_built(groups: Iterable[Mapping[str, Any]]) -> str:
     """Return a row per group that was built."""
     rows = [
-        (*(str(each[name]) for name in ("group", "words", "now", "before")), each["file"] or "not complete")
+        (*(str(each[name]) for name in ("group", "keys", "now", "before")), each["file"] or "not complete")
         for each in groups
     ]
     return table(rows, ("group", "keys", "computed now", "before", "file"))
@@ -70,7 +70,7 @@ def require_whole(record: Record, needed: Mapping[str, type]) -> None:
     wrong = [name for name, kind in needed.items() if not isinstance(record.get(name), kind)]
     if wrong and "refused" not in record:
         raise BadRequest(
-            f"catalog entry {record['word'][:60]!r}: fields missing or of the wrong type: {', '.join(wrong)}",
+            f"catalog entry {record['key'][:60]!r}: fields missing or of the wrong type: {', '.join(wrong)}",
             remedy="Build the file again with hrsynth catalog build.",
         )
 
@@ -78,9 +78,9 @@ def require_whole(record: Record, needed: Mapping[str, type]) -> None:
 def _row(record: Record) -> tuple[str, ...]:
     require_whole(record, LISTED)
     if "refused" in record:
-        return (record["word"], record.get("notation", ""), "", "", "", "refused", "", str(record["refused"]))
+        return (record["key"], record.get("notation", ""), "", "", "", "refused", "", str(record["refused"]))
     return (
-        record["word"],
+        record["key"],
         record["notation"],
         str(record["dof"]),
         record["motion"],
@@ -108,10 +108,8 @@ def facts(record: Record, smallest: Sequence[Record] = ()) -> Iterable[tuple[str
     if "refused" in record:
         yield "refused", str(record["refused"])
         return
-    yield (
-        "dof",
-        f"{record['dof']}, {record['motion']} (mobility {record['mobility']}, of which {record['idle']} internal)",
-    )
+    mobility = f"mobility {record['mobility']}, of which {record['internal']} internal"
+    yield "dof", f"{record['dof']}, {record['motion']} ({mobility})"
     yield "hidden robot", str(record.get("hidden", "none"))
     yield "verdict", f"{record['verdict']} (rank {record['rank']} of {record['dof']})"
     if record["exact"]:
@@ -122,9 +120,9 @@ def facts(record: Record, smallest: Sequence[Record] = ()) -> Iterable[tuple[str
         yield "confirmed", f"at {record['confirmed']} closed configurations"
     if record.get("steps"):
         yield "rules", "; ".join(record["steps"])
-    if record.get("lost"):
-        yield "unobserved", "; ".join(record["lost"])
-    told, what = ("fixed", "observations") if "see" in record else ("observed", "legs")
+    if record.get("unobserved"):
+        yield "unobserved", "; ".join(record["unobserved"])
+    told, what = ("fixed", "observations") if "sensors" in record else ("observed", "legs")
     if record.get("minimal"):
         yield f"{what} needed", _sets(record)
     if any(each["hidden"] != record.get("hidden") for each in smallest):
@@ -139,7 +137,7 @@ def facts(record: Record, smallest: Sequence[Record] = ()) -> Iterable[tuple[str
     if record.get("modes_bound") is not None:
         legs = f" with {what} {', '.join(record['modes_legs'])} {told}" if record.get("modes_legs") else ""
         proof = f", {PROOFS[record['modes_proof']]}" if record.get("modes_proof") in PROOFS else ""
-        near = next((each["near"] for each in smallest if each["legs"] == record.get("modes_legs")), None)
+        near = next((each["near_matches"] for each in smallest if each["legs"] == record.get("modes_legs")), None)
         yield (
             "modes",
             (
@@ -149,8 +147,8 @@ def facts(record: Record, smallest: Sequence[Record] = ()) -> Iterable[tuple[str
         )
     elif record["rank"] < record["dof"]:
         yield "modes", f"a continuous family of dimension {record['dof'] - record['rank']} with all {what} {told}"
-    if record.get("cure"):
-        yield "suggestion", str(record["cure"])
+    if record.get("suggestion"):
+        yield "suggestion", str(record["suggestion"])
 
 
 def choice(each: Mapping[str, Any]) -> str:

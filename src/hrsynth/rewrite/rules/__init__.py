@@ -13,11 +13,11 @@ from ..rule import Rule, Stage
 
 @cache
 def rules(*stages: Stage) -> tuple[Rule[Any, Any], ...]:
-    """The rules of some stages (default: of all), stage by stage, by their files' names in each."""
+    """Return the rules of some stages (default: all), stage by stage, in each by descending names of their files."""
     found = list(_find_rules())
     return tuple(rule for stage in stages or Stage for rule in found if rule.stage is stage)
 
 
 def _find_rules() -> Iterator[Rule[Any, Any]]:
-    for module in sorted(iter_modules(__path__), key=lambda module: module.name):
+    for module in sorted(iter_modules(__path__), key=lambda module: module.name, reverse=True):
         yield import_module(f"{__name__}.{module.name}").RULE

@@ -5,11 +5,11 @@ const FACETS = ["group", "legs", "dof", "motion", "verdict", "fewest", "base"];
 const BASE = { 1: "on the base", 0: "some move" };
 const HEADS = [
   ["order", "drawing"],
-  ["notation", "robot"], ["hidden", "hidden robot"], ["dof", "freedoms"], ["verdict", "verdict"],
-  ["fewest", "legs to watch"], ["base", "motors"], ["group", "group"],
+  ["notation", "robot"], ["hidden", "hidden robot"], ["dof", "dof"], ["verdict", "verdict"],
+  ["fewest", "legs needed"], ["base", "motors"], ["group", "group"],
 ];
-const TEXTS = ["alias", "group", "motion", "verdict", "notation", "hidden", "condition", "cure", "refused", "steps", "lost"];
-const count = CATALOG.word.length;
+const TEXTS = ["alias", "group", "motion", "verdict", "notation", "hidden", "condition", "suggestion", "refused", "steps", "unobserved"];
+const count = CATALOG.key.length;
 const form = document.getElementById("filters");
 const element = (id) => document.getElementById(id);
 const said = (number) => number.toLocaleString("en");
@@ -20,8 +20,8 @@ function value(field, i) {
   return Array.isArray(column) ? column[i] : column.values[column.at[i]] ?? null;
 }
 
-/** All that a search looks at, in small letters: what is stored, and what is on the screen, where a motor is a line. */
-const haystack = CATALOG.word.map((word, i) => {
+/** Searched text in small letters: stored fields and shown cells, in which a line marks a motor. */
+const haystack = CATALOG.key.map((word, i) => {
   const shown = [value("notation", i), value("hidden", i)].map((own) => (own ?? "").replaceAll("*", ""));
   const cells = [`${value("fewest", i)} of ${value("legs", i)}`, BASE[value("base", i)] ?? "", value("verdict", i) ?? "refused"];
   return [word, ...TEXTS.map((field) => value(field, i) ?? ""), ...shown, ...cells].join("\n").toLowerCase();
@@ -29,14 +29,14 @@ const haystack = CATALOG.word.map((word, i) => {
 
 let state = { q: "", sort: "", page: 1 };
 
-/** What the address asks for. */
+/** Read the filters of the address. */
 function read() {
   const asked = new URLSearchParams(location.hash.slice(1));
   state = { q: asked.get("q") ?? "", sort: asked.get("sort") ?? "", page: Math.max(1, Number(asked.get("page")) || 1) };
   for (const field of FACETS) state[field] = asked.get(field) ?? "";
 }
 
-/** Keep in the address what is asked for. */
+/** Write the filters to the address. */
 function write() {
   const asked = new URLSearchParams();
   for (const [name, given] of Object.entries(state)) {
@@ -100,7 +100,7 @@ function notation(text) {
   return whole;
 }
 
-/** What stands in a cell. */
+/** Content of a cell. */
 function content(field, i) {
   const own = value(field, i);
   switch (field) {
@@ -115,7 +115,7 @@ function content(field, i) {
       link.href = `p/${CATALOG.pages[CATALOG.page[i]]}.html#${CATALOG.name[i]}`;
       link.append(own ? notation(own) : "not drawn");
       const word = document.createElement("code");
-      word.textContent = CATALOG.word[i];
+      word.textContent = CATALOG.key[i];
       const known = document.createElement("small");
       known.textContent = value("alias", i) ?? "";
       return [link, known, word];
@@ -159,7 +159,7 @@ function choices(counts) {
   }
 }
 
-/** Which heading sorts, for those who see it and those who hear it. */
+/** Mark the sorting heading, for screen readers too. */
 function headings() {
   for (const head of document.querySelectorAll("#list th")) {
     const [field, down] = [state.sort.replace("-", ""), state.sort.startsWith("-")];

@@ -2,7 +2,7 @@
 
 const rows = [...document.querySelectorAll("#variants [data-name]")];
 
-/** Grey the joints that have a motor, and say so. */
+/** Mark the joints with a motor, in drawing and title. */
 function mark(motors) {
   for (const joint of document.querySelectorAll("#real [data-joint]")) {
     const driven = joint.dataset.joint.split("\n").some((name) => motors.has(name));
