@@ -27,7 +27,7 @@ from hrsynth.kinematics.chart import TangentChart
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.locked_twists import joint_at
 from hrsynth.mechanism.model import Limits
-from hrsynth.present.text.equilibria import endings as text
+from hrsynth.present.text.equilibria import equilibria as text
 from hrsynth.simulation.equilibria.completeness import CompletenessProof
 from hrsynth.simulation.equilibria.critical_poses import CriticalPoses, PoseToJoints, _held_sets, critical_poses
 from hrsynth.simulation.equilibria.descent import CriticalPoint, Tangents, descend, walk_at_random
