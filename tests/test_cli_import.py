@@ -159,7 +159,7 @@ def test_without_a_terminal_guesses_are_taken_and_told(ending: str, tmp_path: Pa
         Path("robot.xml").write_text("\n".join(line for line in text.splitlines() if "hrsynth_platform" not in line))
     assert execute(["import", f"robot{ending}", "-o", "out.urdf"]) == 0
     out, err = capsys.readouterr()
-    assert ("guess: the platform" in err) is (ending == ".xml")
+    assert ("assumption: the platform" in err) is (ending == ".xml")
     written = Path("out.urdf").read_bytes()
     assert execute(shlex.split(out.rpartition("questions: ")[2])[1:]) == 0
     assert Path("out.urdf").read_bytes() == written
@@ -220,7 +220,7 @@ def test_its_record_holds_the_command(tmp_path: Path, capsys, monkeypatch):
         (["import", "3rps", "-o", "out.xml"], ".urdf"),
         (["import", "nobody", "-o", "out.urdf"], "neither a file"),
         (["import", "3rps", "-o", "away/out.urdf"], "no such folder"),
-        (["import", "open.urdf", "-o", "open.urdf"], "the one being read"),
+        (["import", "open.urdf", "-o", "open.urdf"], "it is the input file"),
         (["import", "open.urdf", "-o", "out.urdf"], "--platform"),
         (["import", "open.urdf", "--platform", "x", "-o", "out.urdf"], "no such platform"),
         (["import", "3rps"], "--output"),

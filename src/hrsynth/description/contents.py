@@ -241,7 +241,7 @@ def unsaid(robot: Mechanism, kinds: Collection[str], *, dialect: str) -> list[No
         links = [name for name, content in contents.items() if any(solid.kind == kind for solid in content.solids)]
         if links:
             found.append(f"the {kind} shapes of {comma_list(links)}")
-    return [Note("warning", f"{dialect} cannot hold these, which are lost: {'; '.join(found)}")] if found else []
+    return [Note("warning", f"{dialect} has no place for these, which are lost: {'; '.join(found)}")] if found else []
 
 
 def _tag(fragment: str) -> str:

@@ -203,7 +203,7 @@ def _numbers(part: str, option: str) -> str:
     """Return numbers with spaces in place of commas, as attributes have them. Raises ``BadRequest`` for an empty
     number."""
     if not all(each.strip() for each in part.split(",")):
-        raise BadRequest(f"{option}: an empty number", part, "numbers separated by commas")
+        raise BadRequest(f"{option}: an empty number", part, "numbers with commas between them")
     return part.replace(",", " ")
 
 
@@ -233,7 +233,7 @@ def parse_camera(text: str) -> NamedCamera:
         try:
             values = numerals.parse(" ".join(word[1] for word in words if word), 3)
         except ValueError as error:
-            raise BadRequest(f"--camera {text}", part, f"{error} separated by commas") from None
+            raise BadRequest(f"--camera {text}", part, f"{error} with commas between them") from None
         if any(word and word[2] for word in words) and number == 0:
             raise BadRequest(f"--camera {text}", part, "metres")
         numbers[number] = values * [math.radians(1) if word and word[2] else 1.0 for word in words]

@@ -109,7 +109,7 @@ def document(text: bytes | str, file: str, notes: list[Note] | None = None) -> E
         data = mended
     # raised here, not above: libraries that send errors between processes take their context along, and the parser's
     # own error cannot be sent
-    raise refusal(file, "malformed XML", "a complete XML document", value=what, line=at)
+    raise refusal(file, "malformed XML", "a whole XML document", value=what, line=at)
 
 
 def _require_few_names(root: Element, file: str) -> None:

@@ -16,7 +16,7 @@ from ..tolerances import NOISE_STEP
 from .cameras import CameraObservation
 from .observation import Observation
 
-EXAMPLE = "0.1deg or 0.002 (rad), 0.3px in the image, 1mm of lengths; several separated by commas"
+EXAMPLE = "0.1deg or 0.002 (rad), 0.3px in the image, 1mm of lengths; several with commas"
 UNITS = {"px": ("px", 1.0), "deg": ("rad", math.radians(1)), "mm": ("m", 1e-3), "m": ("m", 1.0), "": ("rad", 1.0)}
 """Suffixes of amounts, the longer ones first: unit of the error, and factor to it."""
 IN_WORDS = {"px": ("pixels", "0.3px"), "rad": ("angles", "0.1deg"), "m": ("lengths", "1mm")}

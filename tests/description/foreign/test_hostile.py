@@ -74,7 +74,7 @@ def test_an_unknown_name_tells_those_that_there_are(dialect: str, old: str, new:
 
 def test_a_cut_settings_file_is_refused_with_what_is_wanted(tmp_path: Path):
     made(tmp_path, URDF["urdf+"], "robot.urdf")
-    assert_refused(made(tmp_path, 'closed_loop: [["a", "b"', "robot.yaml"), "not YAML", "expected a complete YAML file")
+    assert_refused(made(tmp_path, 'closed_loop: [["a", "b"', "robot.yaml"), "not YAML", "expected a whole YAML file")
 
 
 @pytest.mark.parametrize("dialect", ONE)

@@ -205,7 +205,7 @@ def test_gears_stay_with_their_joints_whatever_link_is_the_base(tmp_path: Path):
     assert base / (one - base) == pytest.approx(-(1 + 0.5 - 0.7))
     part = read(tmp_path, text, base="base", platform="two")
     assert [each.name for each in part.couplings] == ["mimic_q"]
-    with pytest.raises(BadRequest, match="gears join joints between 'one' and 'tip' through others: got 'p'"):
+    with pytest.raises(BadRequest, match="couplings connect joints between 'one' and 'tip' through others: got 'p'"):
         read(tmp_path, text, base="one", platform="tip")
 
 

@@ -310,7 +310,7 @@ RULES = (
         "constraint-dead",
         "warning",
         "a closure or coupling that constrains nothing",
-        "A loop closed twice is overdetermined: solvers of constraint forces have no unique solution, and rounded "
+        "A loop closed twice is overdetermined: solvers of constraint forces have no single solution, and rounded "
         "numbers may lock the loop.",
         "remove it",
         _dead,
@@ -321,7 +321,7 @@ RULES = (
         "note",
         "redundant constraints",
         "Normal in planar and over-constrained loops, and harmless in ideal geometry. Solvers of constraint "
-        "forces have no unique solution, and rounded numbers may lock the loop.",
+        "forces have no single solution, and rounded numbers may lock the loop.",
         "nothing, or a joint with more dof (spherical instead of revolute)",
         _redundant,
     ),

@@ -47,7 +47,7 @@ def settings_in(path: Path) -> dict[str, Any] | None:
             raise xml.refusal(path, "YAML file too large", f"up to {LARGEST_YAML} bytes")
         found = Lists(data.decode("utf-8")).get_single_data()
     except (yaml.YAMLError, RecursionError, ValueError, ArithmeticError, LookupError) as error:
-        raise xml.refusal(path, f"not YAML: {' '.join(str(error).split())[:120]}", "a complete YAML file") from None
+        raise xml.refusal(path, f"not YAML: {' '.join(str(error).split())[:120]}", "a whole YAML file") from None
     if not isinstance(found, dict) or not set(KEYS) & set(found):
         return None
     return {key: None if isinstance(value, str) and value in NULL else value for key, value in found.items()}
