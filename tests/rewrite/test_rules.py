@@ -217,7 +217,7 @@ def test_trust_in_arms_that_turn_the_parallelogram_is_caught(seed: int) -> None:
     is_right(setup, result.state.mechanism)
     refused = [step for step in result.steps if step.rule == "rod transfer" and not step.accepted]
     assert {step.leg for step in refused} == {"1", "2", "3"}
-    assert all("changes its direction" in step.reason for step in refused)
+    assert all("changes direction" in step.reason for step in refused)
     assert result.state.architecture().ascii != "3-Pi-{2-U*S}"
 
 

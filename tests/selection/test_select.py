@@ -305,7 +305,7 @@ def test_a_blind_camera_discards_every_set() -> None:
         ({"cone": "1=0.1deg"}, "no angle for leg 2"),
         ({"size": 0}, "size: got 0"),
         ({"runs": -1}, "runs"),
-        ({"visible_from": "x=0"}, "camera"),
+        ({"visible_from": "x=0"}, "the pose is incomplete"),
         ({"visible_from": "x=0,y=0,z=0,rpy=0/0/0", "focal": 0.0}, "focal"),
         ({"examine": 0}, "examine: got 0"),
         ({"start": "w=1"}, "unknown part"),
