@@ -92,7 +92,7 @@ def breaches(path: Path) -> Iterator[tuple[str, int, str]]:
         targets = (
             node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
         )
-        number = isinstance(getattr(node, "value", None), ast.Constant) and isinstance(node.value.value, int | float)  # type: ignore[union-attr]
+        number = isinstance(getattr(node, "value", None), ast.Constant) and isinstance(node.value.value, int | float)  # type: ignore[attr-defined]
         for target in targets:
             if number and isinstance(target, ast.Name) and target.id.isupper() and not QUANTITY.search(target.id):
                 yield "quantity", node.lineno, target.id
