@@ -18,6 +18,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -98,7 +99,8 @@ def breaches(path: Path) -> Iterator[tuple[str, int, str]]:
         targets = (
             node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
         )
-        number = isinstance(getattr(node, "value", None), ast.Constant) and isinstance(node.value.value, int | float)  # type: ignore[union-attr, attr-defined]
+        value: Any = getattr(node, "value", None)
+        number = isinstance(value, ast.Constant) and isinstance(value.value, int | float)
         for target in targets:
             if number and isinstance(target, ast.Name) and target.id.isupper() and not QUANTITY.search(target.id):
                 yield "quantity", node.lineno, target.id
