@@ -144,30 +144,30 @@ def test_a_flag_can_be_denied_and_words_that_repeat_are_all_taken():
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        ("derive", "derive needs ROBOT"),
+        ("derive", "derive: ROBOT missing"),
         ("accuracy delta", "as --cone 0.1deg, or"),
-        ("catalog site", "catalog site needs -o, --output DIR"),
-        ("derive quattro --observ 1", "no such option: got '--observ', expected --observe"),
-        ("derive quattro -x", "derive: no such option: got '-x'"),
-        ("derive quattro --nope", "no such option: got '--nope', expected --as-written, --at"),
-        ("-x", "no such option: got '-x', expected -h, --help"),
+        ("catalog site", "catalog site: -o, --output DIR missing"),
+        ("derive quattro --observ 1", "derive has no option --observ. Try --observe"),
+        ("derive quattro -x", "derive has no option -x. Try --as-written"),
+        ("derive quattro --nope", "derive has no option --nope. Try --as-written, --at"),
+        ("-x", "unknown option: got '-x', expected -h, --help"),
         ("derive quattro --seed x", "--seed: got 'x', expected an integer, at least 0"),
         ("derive quattro --seed 1.5", "--seed: got '1.5'"),
         ("derive quattro --seed=-1", "--seed: got '-1'"),
         ("servo delta --gain 1e9", "--gain: got '1e9', expected a number, at most 1e+06"),
         ("modes delta --time-limit nan", "--time-limit: got 'nan'"),
-        ("derive quattro a b", "derive takes no more arguments: got 'a b'"),
+        ("derive quattro a b", "a b: unexpected argument. See hrsynth derive -h"),
         ("derive quattro --at", "--at: expected one argument: expected POSE"),
-        ("derive quattro -o --observe 1,4", "-o needs a value: got '--observe', expected FILE, or -o=--observe"),
-        ("legs delta --observe --at 1", "--observe needs a value: got '--at'"),
-        ("derive quattro --observe 1 --observe 4", "--observe is given 2 times: got '1 4', expected 1,4"),
+        ("derive quattro -o --observe 1,4", "-o: no value. Give FILE, or write -o=--observe"),
+        ("legs delta --observe --at 1", "--observe: no value. Give LEGS, or write --observe=--at"),
+        ("derive quattro --observe 1 --observe 4", "--observe: repeated. Write --observe 1,4."),
         ("derive quattro --json=3", "--json: ignored explicit argument '3'"),
         *[
             (f"derive quattro --seed{between}--", "--seed: got '--', expected an integer, at least 0")
             for between in " ="
         ],
-        ("nope", "no such command: got 'nope', expected derive"),
-        ("catalog nope", "no such command: got 'nope'"),
+        ("nope", "unknown command: got 'nope', expected derive"),
+        ("catalog nope", "unknown command: got 'nope'"),
     ],
 )
 def test_what_cannot_be_read_is_refused_in_one_line(capsys, words: str, told: str):

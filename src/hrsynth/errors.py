@@ -192,10 +192,7 @@ class RankUndecided(NoResult):
 
     def __init__(self, what: str, gap: float, needed: float) -> None:
         self.what, self.gap, self.needed = what, gap, needed
-        super().__init__(
-            f"{what}: rank undecided: gap {gap:.3g} between singular values, at least {needed:.3g} needed",
-            "Give the file's numbers more decimals, or choose another configuration.",
-        )
+        super().__init__(f"{what}: rank undecided: gap {gap:.3g}, needed {needed:.3g}", "Give more decimals.")
 
 
 class RankBelowRounding(RankUndecided):
@@ -361,8 +358,7 @@ class Disagreement(NoResult):
     def __init__(self, robot: str, poses: int, angle: float) -> None:
         self.robot, self.poses, self.angle = robot, poses, angle
         super().__init__(
-            f"{robot}: the condition and the rank disagree at {poses} poses (leg wrenches differ by up to "
-            f"{angle:.2g} rad)",
+            f"{robot}: condition and rank disagree at {poses} poses (leg wrenches differ by {angle:.2g} rad)",
             "Report this as a defect of hrsynth, with the robot file.",
         )
 
@@ -372,10 +368,7 @@ class UnsupportedLocus(NoResult):
 
     def __init__(self, robot: str, reason: str) -> None:
         self.robot, self.reason = robot, reason
-        super().__init__(
-            f"{robot}: assembly modes cannot be listed: {reason}",
-            "Observe other legs, or remove the feature that the message names.",
-        )
+        super().__init__(f"{robot}: assembly modes cannot be listed: {reason}", "Observe other legs.")
 
 
 class NotConfirmed(NoResult):
@@ -459,7 +452,7 @@ class NeedsPosix(NoResult):
 
     def __init__(self, what: str, module: str) -> None:
         self.what, self.module = what, module
-        super().__init__(f"{what} needs a POSIX system: this Python has no module {module}", "Use Linux, macOS or WSL.")
+        super().__init__(f"{what} needs the module {module} of POSIX systems", "Use Linux, macOS or WSL.")
 
 
 class WorkersLost(NoResult):
@@ -475,11 +468,8 @@ class BuildStopped(NoResult):
 
     def __init__(self, reason: str, kept: str | None = None, what: str = "build") -> None:
         self.reason, self.kept = reason, kept
-        text = f"the {what} stopped: {reason}"
-        if kept is not None:
-            super().__init__(f"{text}; finished work is kept in {kept}", "Repeat the command to continue.")
-        else:
-            super().__init__(text, "Repeat the command.")
+        rest = "" if kept is None else f"; finished work is kept in {kept}"
+        super().__init__(f"the {what} stopped: {reason}{rest}", "Repeat the command to continue.")
 
 
 class CatalogStale(NoResult):

@@ -93,8 +93,7 @@ def output(program: Path, *arguments: str, seconds: int, given: str = "") -> byt
     except (subprocess.TimeoutExpired, ValueError):
         raise BadRequest(f"not read within {seconds} s", remedy="Use a smaller file.") from None
     except OSError as error:
-        text = f"{tempfile.gettempdir()}: cannot write a temporary file: {error.strerror}"
-        raise BadRequest(text, remedy="Set TMPDIR to a writable folder.") from None
+        raise BadRequest(f"{tempfile.gettempdir()}: {error.strerror}", remedy="Set TMPDIR to another folder.") from None
     last = [line.removeprefix(REFUSED) for line in lines if line.startswith(REFUSED)]
     raise BadRequest(last[-1][:400] if last else "memory or time limit exceeded, or the reader crashed")
 

@@ -211,7 +211,7 @@ def test_plates_are_told_apart_by_the_hidden_robots_of_pairs(run):
 
 def test_no_robot_of_a_refused_architecture_is_written(run, tmp_path: Path):
     file = tmp_path / "robot.urdf"
-    check_refused(run("show", "2(Px*-2SSy)", "-o", file), "--output: the catalog refuses 2(Px*-2SSy): no confirmed")
+    check_refused(run("show", "2(Px*-2SSy)", "-o", file), "2(Px*-2SSy): refused: no confirmed")
     assert not file.exists()
 
 
@@ -244,8 +244,8 @@ def test_bad_input_is_one_line(run, folder: Path, tmp_path: Path, monkeypatch: p
     package = Path(hrsynth.__file__).parent
     check_refused(run("build", "-o", package / "catalog" / "new"), "inside the installed package")
     check_refused(run("build", "nothing", "-o", tmp_path / "new"), "unknown group: got 'nothing', expected c, d")
-    check_refused(run("build", "-o", tmp_path / "new", "--sample", 3), "--sample: needs --check")
-    check_refused(run("build", "-o", folder, "--check", "--anew"), "--anew: not possible with --check")
+    check_refused(run("build", "-o", tmp_path / "new", "--sample", 3), "--sample without --check")
+    check_refused(run("build", "-o", folder, "--check", "--anew"), "--anew with --check")
     check_refused(run("build", "-o", tmp_path / "new", "--workers", 0), "--workers")
     check_refused(run("build", "-o", tmp_path / "no" / "where"), "No such file or directory")
     check_refused(run("list", "--catalog", tmp_path / "nowhere"), "not found")

@@ -97,7 +97,7 @@ def test_every_rule_has_its_sentence():
     assert {rule.name for rule in known_rules()} <= set(RULES)
     said = list(rules({"steps": ["motors off", "lift 1,2,3", "leg removal 2"]}))
     assert said[1].startswith("A virtual chain that constrains nothing is added to legs 1, 2 and 3;")
-    assert said[2] == "The platform and the watched legs move as before without leg 2: left out."
+    assert said[2] == "Without leg 2 the platform and the observed legs move as before: removed."
 
 
 @pytest.mark.parametrize("group", ["pods", "spatial"])
@@ -114,5 +114,5 @@ def test_every_cure_and_every_step_of_the_catalog_is_told_in_sentences(group: st
 def test_a_cure_names_what_is_measured_and_where():
     assert cure({"dof": 3, "suggestion": "direction link_1_2 and encoder joint_3_1"}) == (
         "Measure the direction of the link after joint 2 of leg 1 (link_1_2) and the encoder of joint 1 of leg 3 "
-        "(joint_3_1) as well: then all 3 freedoms are seen."
+        "(joint_3_1) as well: this shows all 3 dof."
     )

@@ -131,7 +131,7 @@ def test_the_command_line_lists_and_shows_them(capsys: pytest.CaptureFixture[str
     assert all(each["sensors"] == "3point" for each in listed["entries"])
     Draft202012Validator(schema("catalog list")).validate(listed)
     shown = call("show", "6(Utn-Pl*-S)@3point")[1]
-    assert "seen of the platform: 3point" in shown
+    assert "sensors: 3point" in shown
     assert "danger cylinder" in shown
     assert call("list", "--sensor", "3dot")[0] == call("site", "-o", "nowhere", "--group", "sensors")[0] == 2
 

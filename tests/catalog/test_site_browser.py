@@ -128,7 +128,7 @@ def test_a_search_finds_what_is_on_the_screen_and_known_names(tab: Tab, tmp_path
         tab.page.get_by_label("Search").fill(asked)
         tab.page.wait_for_function(f"new URLSearchParams(location.hash.slice(1)).get('q') == {asked!r}")
         assert rows(tab) == [facts[found]["key"]], asked
-    tab.page.get_by_text("What the words mean").click()
+    tab.page.get_by_text("Explanations").click()
     assert tab.page.get_by_text("2T1R are two translations").is_visible()
 
 

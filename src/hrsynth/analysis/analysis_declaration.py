@@ -154,9 +154,8 @@ def analysis(
                 return function(*bound.args, **bound.kwargs)
             every = known.bind(*args, **given)
             every.apply_defaults()
-            if "observe" in every.arguments:
-                sensor = every.arguments.get("sensor")
-                every.arguments["observe"] = legs_asked(robot, every.arguments["observe"], sensor)
+            if "observe" in (values := every.arguments):
+                values["observe"] = legs_asked(robot, values["observe"], values.get("sensor"))
             told = [(name, content(value)) for name, value in every.arguments.items() if name != "robot"]
             key = (function.__qualname__, robot, source.file, source.notes, source.options, source.sha256, *told)
             try:

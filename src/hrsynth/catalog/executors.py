@@ -69,9 +69,7 @@ def _run_on_cluster(task: Task, parts: Iterable[list[str]], address: str) -> Ite
     try:
         client = Client(address, timeout=PATIENCE, set_as_default=False)
     except (ValueError, TypeError) as error:
-        raise BadRequest(
-            f"--cluster {address}: not an address: {error}", remedy="Write it as tcp://host:8786."
-        ) from None
+        raise BadRequest(f"--cluster {address}: {error}", remedy="Write it as tcp://host:8786.") from None
     except (OSError, ImportError):
         raise Stopped(f"no cluster answers at {address} within {PATIENCE:g} s") from None
     try:

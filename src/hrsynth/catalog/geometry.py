@@ -267,9 +267,7 @@ class _Limb:
         names = joint.axes
         known = {name: unit(line) if name == "l" else self._vector(name, at) for name in names if name not in "nq"}
         if not known:
-            raise BadRequest(
-                f"key {str(self.draft.word)!r}: axes of a U", names, remedy="Name one of them other than n or q."
-            )
+            raise BadRequest(f"key {self.draft.word}: axes of a U", names, remedy="Name one other than n or q.")
         found = []
         for name, other in zip(names, reversed(names), strict=True):
             if name == "n":
@@ -279,10 +277,7 @@ class _Limb:
             else:
                 found.append(known[name])
         if abs(found[0] @ found[1]) > SQUARE_AXES:
-            raise BadRequest(
-                f"key {str(self.draft.word)!r}: the axes of U{names} are not at right angles",
-                remedy="Use n or q for one of them.",
-            )
+            raise BadRequest(f"key {self.draft.word}: axes of U{names} not at right angles", remedy="Use n or q.")
         return found
 
     def _vector(self, name: str, at: Array) -> Array:

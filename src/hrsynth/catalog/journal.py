@@ -27,9 +27,7 @@ class Journal:
         try:
             self._file = open_kept(path, os.O_RDWR | os.O_APPEND)
         except OSError as error:
-            raise BadRequest(
-                f"{path}: cannot write the journal: {error.strerror}", remedy="Choose another path."
-            ) from None
+            raise BadRequest(f"{path}: cannot write: {error.strerror}", remedy="Choose another path.") from None
         try:
             require_alone(self._file, "another build is writing this journal", path)
             if anew:

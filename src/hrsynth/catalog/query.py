@@ -143,8 +143,8 @@ def load(path: str | Path | None = None, **asked: Any) -> Catalog:
     Parameters
     ----------
     path : str or Path, optional
-        Folder or SQLite file; ``published``: the shipped catalog of published robots; ``all``: this and the shipped one
-        of architectures, which is the default.
+        Folder or SQLite file. Default: the shipped catalog of architectures; ``published``: that of published robots;
+        ``all``: both.
     **asked
         Criteria of :meth:`Catalog.where`.
 

@@ -278,9 +278,7 @@ def _readable(file: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise BadRequest(
-            f"{file}: cannot be read: {error.strerror}", remedy="Check the path and its access rights."
-        ) from None
+        raise BadRequest(f"{file}: cannot be read: {error.strerror}", remedy="Check the path.") from None
 
 
 @contextlib.contextmanager

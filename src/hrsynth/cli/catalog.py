@@ -202,10 +202,7 @@ def build(
     senseless = {"--limit": limit is not None, "--anew": anew} if check else {"--sample": sample is not None}
     for option, given in senseless.items():
         if given:
-            raise BadRequest(
-                f"{option}: {'not possible with' if check else 'needs'} --check",
-                remedy=f"{'Omit' if check else 'Add'} --check.",
-            )
+            raise BadRequest(f"{option} {'with' if check else 'without'} --check", remedy=f"Omit {option}.")
     if check:
         from ..catalog.build import check as run
         from ..catalog.store import shipped_folder
@@ -330,10 +327,7 @@ def show(word: str, output: str | None, kept: str | None, json: bool) -> None:
         found = _of_word(word, kept)
         if output is not None:
             if "refused" in found.record:
-                raise BadRequest(
-                    f"--output: the catalog refuses {word}: {found.record['refused']}",
-                    remedy="Choose an architecture with a verdict (hrsynth catalog list).",
-                )
+                raise BadRequest(f"{word}: refused: {found.record['refused']}", remedy="Choose one with a verdict.")
             robot = found.mechanism()
         smallest = [] if found.studied is None else smallest_sets(found.record, found.studied())
     if output is not None:
@@ -414,13 +408,9 @@ def site(output: str, workers: int, anew: bool, kept: str | None, json: bool, **
                 "select them, for example by --group"
             )
     if seen := [each["key"] for each in found if "sensors" in each]:
-        raise BadRequest(
-            f"no pages for keys with sensors, such as {seen[0]}", remedy="Use hrsynth catalog show or list."
-        )
+        raise BadRequest(f"{seen[0]}: no pages for keys with sensors", remedy="Use hrsynth catalog show.")
     if published := [each["key"] for each in found if "choices" in each]:
-        raise BadRequest(
-            f"no pages for published robots, such as {published[0]}", remedy="Use hrsynth catalog show or list."
-        )
+        raise BadRequest(f"{published[0]}: no pages for published robots", remedy="Use hrsynth catalog show.")
     with Progress(counted=True) as progress:
         done = run(found, output, workers=workers, anew=anew, tell=progress.count)
     if done.differ:

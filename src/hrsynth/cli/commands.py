@@ -69,10 +69,7 @@ class DeclaredCommand:
         for word in takewhile("--".__ne__, rest):
             value = next(rest, None) if word in flags and flags[word][0].kind is not bool else None
             if value in flags:
-                raise BadRequest(
-                    f"{word}: value missing before {value}",
-                    remedy=f"Give {flags[word][0].value}, or write {word}={value}.",
-                )
+                raise BadRequest(f"{word}: no value", remedy=f"Give {flags[word][0].value}, or write {word}={value}.")
             joined.append(word if value is None else f"{word}={value}")
         if set(HELP) & set(joined):
             return None
@@ -89,11 +86,9 @@ class DeclaredCommand:
                 usual = flags[own[-1]][0].names[0]
                 raise BadRequest(f"{self.name} has no option {name}", remedy=f"Use {usual} for the pose.")
             if takers := [each.name for each in beside if any(name in option.names for option in each.options)]:
-                raise BadRequest(
-                    f"{self.name} has no option {name}", remedy=f"Omit it; it belongs to {', '.join(takers)}."
-                )
+                raise BadRequest(f"{self.name} has no option {name}", remedy=f"Omit it, or use {', '.join(takers)}.")
             close = get_close_matches(name, flags, cutoff=LIKE_A_FLAG) or sorted(flags)
-            raise BadRequest(f"{self.name} has no option {name}", remedy=f"Use {', '.join(close)}.")
+            raise BadRequest(f"{self.name} has no option {name}", remedy=f"Try {', '.join(close)}.")
         given: dict[str, list[Any]] = vars(found)
         plain += rest
         for option in self.options:
@@ -103,9 +98,7 @@ class DeclaredCommand:
         # Python 3.11 and 3.12 make [] of the value "--"
         for option in self.options:
             if option.names_several and len(texts := given.get(option.name, ())) > 1:
-                raise BadRequest(
-                    f"{option.names[0]}: given {len(texts)} times", remedy=f"Write {option.names[0]} {','.join(texts)}."
-                )
+                raise BadRequest(f"{option.names[0]}: repeated", remedy=f"Write {option.names[0]} {','.join(texts)}.")
         read = {
             each: [each.read("--" if value == [] else value) for value in given[each.name]]
             for each in self.options

@@ -50,9 +50,7 @@ def importing(target: str, observe: str | None, yes: bool, view: bool, json: boo
 
     path = file_of(source["robot"])
     if Path(target).suffix.lower() != ".urdf":
-        raise BadRequest(
-            f"--output {target}: not a .urdf file", remedy="Name a .urdf file; hrsynth convert writes other formats."
-        )
+        raise BadRequest(f"--output {target}: not a .urdf file", remedy="Use hrsynth convert for others.")
     require_writable(target)
     require_other(target, path)
     asking = not (yes or json) and sys.stdin.isatty() and sys.stdout.isatty()

@@ -83,7 +83,7 @@ def add(app: Group) -> None:
                 argument=True,
                 words=shipped_names,
             ),
-            flag("fix", "Apply fixes that are unique; overwrite the file or write to --output."),
+            flag("fix", "Apply fixes that leave no choice; overwrite the file or write to --output."),
             Option("compare", "Another file of the same robot: list the differences.", "OTHER"),
             Option(
                 "program",

@@ -127,7 +127,5 @@ def split_names(text: str) -> list[str]:
 
     names = [name.strip() for name in text.split(",")]
     if not all(names):
-        raise BadRequest(
-            f"--observe {text}: empty name", remedy="Give labels or links with commas between them, or all."
-        )
+        raise BadRequest(f"--observe {text}: empty name", remedy="Give labels or links with commas, or all.")
     return names

@@ -77,9 +77,7 @@ def _prepare(folder: Path, stamp: dict[str, str], anew: bool) -> None:
             return
     other = sorted({each.name for each in folder.iterdir()} - OWN)
     if other:
-        raise BadRequest(
-            f"{folder}: this draft folder holds other files ({other[0]} …)", remedy="Move the folder away."
-        )
+        raise BadRequest(f"{folder}: holds other files ({other[0]} …)", remedy="Move the folder away.")
     for each in folder.iterdir():
         shutil.rmtree(each) if each.is_dir() else each.unlink()
     for name in FOLDERS:

@@ -22,8 +22,8 @@ RULES = {
     "end change": "In {legs} the last S joint becomes a U joint.",
     "pi form": "In {legs} a planar parallelogram (Π) carries the actuator, for it moves on a circle.",
     "prismatic merge": "In {legs} the virtual actuator replaces the real joint on the base.",
-    "leg removal": "The platform and the observed legs move as before without {legs}, which are removed.",
-    "keep": "Without {legs} the platform would move differently; they are kept as passive legs.",
+    "leg removal": "Without {legs} the platform and the observed legs move as before: removed.",
+    "keep": "Without {legs} the platform would move differently: kept, without a measurement.",
 }
 """Sentence of each rule; ``{legs}`` are its legs."""
 CONFIRMED = ", confirmed at {confirmed} closed configurations"
